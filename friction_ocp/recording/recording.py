@@ -1,0 +1,42 @@
+"""A recording: named channels of one run of a machine, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One measured signal; NaN marks a missing sample."""
+
+    name: str
+    time: FloatArray
+    """(n,) s, strictly increasing, on the clock of the channel."""
+    values: FloatArray
+    """(n,) in SI units."""
+    unit: str
+    """The SI unit of `values`, such as "rad" or "A"."""
+    clock: str = "time"
+    """Name of the time axis; channels that share it share their clock."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One run: its channels and where they came from."""
+
+    name: str
+    channels: Mapping[str, Channel]
+    title: str = ""
+    source: str = ""
+    licence: str = ""
+    path: Path | None = None
+    sha256: str = ""
+    attributes: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Further text attributes of the file, kept as found."""
