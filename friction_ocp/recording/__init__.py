@@ -1,1 +1,1 @@
-"""recording."""
+"""Recordings of a machine: reading, checking, importing and conditioning them."""

@@ -1,0 +1,177 @@
+"""The change of speed over one step: friction implicit and set-valued, everything else at the midpoint.
+
+Each group obeys J (v1 - v0) / h = tau(v) - torque of friction, whose response over the step is
+offset + slope * mean speed + [-lower, upper] (friction/element.py). Solving for v1 is a soft threshold: no
+smoothing is needed, sticking is exact, and stiff friction does not limit the step. Order 2 while the shaft
+slides, 1 across an event. Related: Moreau 1988 (time stepping of dry friction).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
+from friction_ocp.drive.parts import Shaft, Transmission
+from friction_ocp.friction.element import FrictionElement, StepResponse
+from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, where
+
+NEWTON_STEPS = 3
+
+
+@dataclass(frozen=True)
+class Kick:
+    """Result of one speed update."""
+
+    v: ca.SX
+    """(groups,) speeds after the step."""
+    load: dict[str, Any]
+    """Torque through each transmission that friction depends on, on its output side."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a speed update starts from."""
+
+    h: Any
+    v: ca.SX
+    """(groups,) speeds at the start."""
+    at: Motion
+    """Midpoint angles and the speeds about which torques are linearised."""
+    bristle: dict[str, Any]
+    width: ca.SX
+    """(groups + 1,) rounding of the sign by group, in rad/s; last the relative rounding of backlash corners."""
+
+
+def kick(mech: Mechanism, step: Step) -> Kick:
+    """Return the speeds after a step of `step.h`."""
+    joints = mech.loaded_joints()
+    unknown = ca.SX.sym("transmitted", len(joints))  # pyright: ignore[reportArgumentType]
+    torques, stiffening = _applied(mech, step)
+    corner = step.width[len(mech.topology.roots)]
+    elastic = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
+    load = elastic | {joint.name: unknown[k] for k, joint in enumerate(joints)}
+    v, friction = _solve(mech, step, torques, stiffening, load)
+    if not joints:
+        return Kick(v, load)
+    found = column([_through(mech, step, joint, torques, v, friction) for joint in joints])
+    newton = unknown - ca.solve(_slope(found, unknown), unknown - found)
+    solution = ca.SX.zeros(len(joints))
+    for _ in range(NEWTON_STEPS):
+        solution = ca.substitute(newton, unknown, solution)
+    solved = {joint.name: solution[k] for k, joint in enumerate(joints)}
+    return Kick(ca.substitute(v, unknown, solution), elastic | solved)
+
+
+def _slope(found: ca.SX, unknown: ca.SX) -> ca.SX:
+    return ca.SX.eye(unknown.numel()) - ca.jacobian(found, unknown)
+
+
+def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
+    """Return the torque on each shaft and, by group, the derivative of its torque by its own speed."""
+    groups = len(mech.topology.roots)
+    speed = ca.SX.sym("speed", groups)  # pyright: ignore[reportArgumentType]
+    at = Motion(step.at.q, speed, step.at.extra, step.at.memory)
+    symbolic = mech.applied_torques(at, step.width[groups])
+    total = [_group_sum(mech, g, symbolic) for g in range(groups)]
+    own = [ca.substitute(ca.jacobian(ca.SX(total[g]), speed[g]), speed, step.at.v) for g in range(groups)]
+    torques = {name: ca.substitute(ca.SX(torque), speed, step.at.v) for name, torque in symbolic.items()}
+    return torques, own
+
+
+def _group_sum(mech: Mechanism, group: int, torques: dict[str, Any]) -> Any:
+    ratio = mech.topology.speed_ratio
+    return sum(ratio[name] * torques[name] for name in mech.topology.members(group))
+
+
+def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> Any:
+    """Return |torque| that loads the friction of a shaft, on the shaft's own side."""
+    if shaft.friction.load is None:
+        return 0.0
+    joint = mech.load_joint(shaft)
+    torque = load[joint.name]
+    return smooth_abs(torque / joint.ratio if joint.from_shaft == shaft.name else torque)
+
+
+def _solve(
+    mech: Mechanism, step: Step, torques: dict[str, Any], own: list[Any], load: dict[str, Any]
+) -> tuple[ca.SX, dict[str, Any]]:
+    """Return the new group speeds and the friction torque on each shaft."""
+    speeds = [step.v[g] for g in range(len(mech.topology.roots))]
+    friction: dict[str, Any] = {}
+    for group in mech.free_groups:
+        responses = {
+            name: _response(mech, step, mech.drive.shaft(name), load) for name in mech.topology.members(group)
+        }
+        whole = _combined(mech, responses)
+        inertia, linear_at = mech.inertia(group), step.at.v[group]
+        damping = whole.slope - own[group]
+        drive = _group_sum(mech, group, torques) - own[group] * linear_at - 0.5 * damping * step.v[group]
+        free = step.v[group] + step.h / inertia * (drive - whole.offset)
+        gain = step.h / inertia
+        moved = soft_threshold(free, gain * whole.upper, gain * whole.lower, step.width[group])
+        speeds[group] = moved / ca.fmax(1.0 + 0.5 * gain * damping, 0.5)
+        friction |= _shared(mech, step, group, responses, whole, (free - moved) / gain, speeds[group])
+    return column(speeds), friction
+
+
+def _response(mech: Mechanism, step: Step, shaft: Shaft, load: dict[str, Any]) -> StepResponse:
+    omega = symbol("omega")
+    element: FrictionElement = shaft.friction
+    transmitted = transmitted_torque(mech, shaft, load)
+    response = element.step_response(step.h, omega, step.bristle.get(shaft.name, 0.0), transmitted)
+    now = mech.shaft_speed(shaft.name, step.at.v)
+    terms = (response.offset, response.slope, response.upper, response.lower)
+    return StepResponse(*(ca.substitute(ca.SX(term), omega, now) for term in terms))
+
+
+def _combined(mech: Mechanism, responses: dict[str, StepResponse]) -> StepResponse:
+    """Refer the responses of all shafts of a group to its first shaft."""
+    offset, slope, upper, lower = 0.0, 0.0, 0.0, 0.0
+    for name, response in responses.items():
+        ratio = mech.topology.speed_ratio[name]
+        forward = where(ca.SX(ratio) > 0, response.upper, response.lower)
+        backward = where(ca.SX(ratio) > 0, response.lower, response.upper)
+        size = smooth_abs(ratio) if isinstance(ratio, ca.SX) else abs(ratio)
+        offset += ratio * response.offset
+        slope += ratio**2 * response.slope
+        upper += size * forward
+        lower += size * backward
+    return StepResponse(offset, slope, upper, lower)
+
+
+def _shared(
+    mech: Mechanism,
+    step: Step,
+    group: int,
+    responses: dict[str, StepResponse],
+    whole: StepResponse,
+    set_valued: Any,
+    after: Any,
+) -> dict[str, Any]:
+    """Divide the friction of a group among its shafts; the set-valued part by the shares of the levels."""
+    mean = 0.5 * (step.v[group] + after)
+    friction: dict[str, Any] = {}
+    for name, response in responses.items():
+        ratio = mech.topology.speed_ratio[name]
+        own_level, level = response.upper + response.lower, whole.upper + whole.lower
+        only = sum(not ca.SX(item.upper + item.lower).is_zero() for item in responses.values()) <= 1
+        share = (0.0 if ca.SX(own_level).is_zero() else 1.0) if only else ratio * own_level / (level + 1e-300)
+        friction[name] = response.offset + response.slope * mean * ratio + set_valued * share / ratio
+    return friction
+
+
+def _through(
+    mech: Mechanism, step: Step, joint: Transmission, torques: dict[str, Any], v: ca.SX, friction: dict[str, Any]
+) -> Any:
+    """Return the torque through a rigid joint on its output side, from the balance of what lies beyond it."""
+    group = mech.topology.group_of[joint.to_shaft]
+    acceleration = (v[group] - step.v[group]) / step.h
+    ratio = mech.topology.speed_ratio
+    total: Any = 0.0
+    for name in mech.topology.beyond(joint):
+        resisting = mech.drive.shaft(name).inertia * ratio[name] * acceleration + friction.get(name, 0.0)
+        total = total + ratio[name] / ratio[joint.to_shaft] * (resisting - torques[name])
+    return total

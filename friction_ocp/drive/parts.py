@@ -1,0 +1,157 @@
+"""The parts of a drive. Their fields are their parameters: unit kind and meaning are stated once, here.
+
+Inertia, friction, gravity and external torque of a shaft are on its own side; stiffness, damping and
+backlash of a transmission are on its output side; ratio = speed_in / speed_out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.static import NoFriction
+from friction_ocp.parameters import Value, quantity
+
+Motion = Literal["rotary", "linear"]
+ControllerType = Literal["duty", "p", "pd", "pi_velocity", "cascade"]
+Role = Literal["input", "output"]
+Hold = Literal["zero", "linear"]
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """Torque -torque sin(theta + phase) of an unbalanced mass."""
+
+    torque: Value = quantity("torque", "gravity torque at 90 deg")
+    phase: Value = quantity("angle", "angle at which gravity vanishes", 0.0)
+
+
+@dataclass(frozen=True)
+class ExternalTorque:
+    """A torque that does not change."""
+
+    constant: Value = quantity("torque", "constant torque")
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """A rigid body that turns (or moves along a line)."""
+
+    name: str
+    inertia: Value = quantity("inertia", "inertia")
+    friction: FrictionElement = FrictionElement(NoFriction())
+    gravity: Gravity | None = None
+    external_torque: ExternalTorque | None = None
+    motion: Motion = "rotary"
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """A reducer, coupling or screw between two shafts; `stiffness` None joins them rigidly."""
+
+    from_shaft: str
+    to_shaft: str
+    ratio: Value = quantity("dimensionless", "speed in over speed out", 1.0)
+    stiffness: Value = quantity("stiffness", "stiffness", None)
+    damping: Value = quantity("viscous", "damping", 0.0)
+    backlash: Value = quantity("angle", "free play", 0.0)
+
+    @property
+    def name(self) -> str:
+        """The name in results: `<from>-<to>`."""
+        return f"{self.from_shaft}-{self.to_shaft}"
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the two shafts always move together."""
+        return self.stiffness is None
+
+
+@dataclass(frozen=True)
+class Motor:
+    """An electric motor on a shaft; its back-EMF constant equals its torque constant."""
+
+    name: str
+    shaft: str
+    torque_constant: Value = quantity("torque_constant", "torque constant", 1.0)
+    resistance: Value = quantity("resistance", "winding resistance", None)
+    inductance: Value = quantity("inductance", "winding inductance", None)
+    share: Value = quantity("dimensionless", "share of the command", 1.0)
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Closes the loop from a reference through the feedback channel."""
+
+    type: ControllerType
+    feedback: str
+    output: Literal["voltage", "current", "torque"] = "voltage"
+    kp: Value = quantity("gain", "proportional gain", 0.0)
+    ki: Value = quantity("gain", "integral gain", 0.0)
+    kd: Value = quantity("gain", "derivative (inner speed) gain", 0.0)
+    sample_time: float | None = None
+    delay: float = 0.0
+    saturation: tuple[Value, ...] | None = quantity("gain", "output limit", None)
+    anti_windup: bool = True
+    derivative: Literal["backward", "two_tap_mean"] = "backward"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A recorded signal: recorded(t) = gain * true(t - delay) + offset, quantised by `resolution`."""
+
+    name: str
+    measures: str
+    role: Role = "output"
+    gain: Value = quantity("dimensionless", "sensor gain", 1.0)
+    offset: Value = quantity("channel", "sensor offset", 0.0)
+    delay: Value = quantity("time", "sensor delay", 0.0)
+    resolution: float | None = None
+    noise_std: float | None = None
+    hold: Hold = "linear"
+
+    @property
+    def part(self) -> str:
+        """Name of the shaft, motor or `reference` that the channel looks at."""
+        return self.measures.partition(".")[0]
+
+    @property
+    def signal(self) -> str:
+        """What it looks at there: theta, omega, alpha, current, ..."""
+        return self.measures.partition(".")[2]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive chain: parts joined by their names."""
+
+    shafts: tuple[Shaft, ...]
+    transmissions: tuple[Transmission, ...] = ()
+    motors: tuple[Motor, ...] = ()
+    controller: Controller | None = None
+    channels: tuple[Channel, ...] = field(default=())
+
+    def shaft(self, name: str) -> Shaft:
+        """Return the shaft called `name`; KeyError lists the shafts that exist."""
+        for shaft in self.shafts:
+            if shaft.name == name:
+                return shaft
+        raise KeyError(f"no shaft '{name}'; there are {', '.join(shaft.name for shaft in self.shafts)}")
+
+    def motor(self, name: str) -> Motor:
+        """Return the motor called `name`; KeyError lists the motors that exist."""
+        for motor in self.motors:
+            if motor.name == name:
+                return motor
+        raise KeyError(f"no motor '{name}'; there are {', '.join(motor.name for motor in self.motors)}")
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """The channels that drive the simulation."""
+        return tuple(channel for channel in self.channels if channel.role == "input")
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The channels that the simulation predicts."""
+        return tuple(channel for channel in self.channels if channel.role == "output")

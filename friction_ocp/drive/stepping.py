@@ -1,0 +1,213 @@
+"""One time step of a drive, its outputs and its controller ticks, as CasADi functions of named vectors.
+
+The step is a symmetric splitting: half a drift of the angles, one update of the speeds (kick.py), half a
+drift again. Order 2 on smooth motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from friction_ocp.drive.control import ControlSignals, apply_tick, compute_tick
+from friction_ocp.drive.kick import Step, kick, transmitted_torque
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.parts import Channel, Drive
+
+
+@dataclass(frozen=True)
+class SteppedDrive:
+    """A drive in discrete time.
+
+    `step(x, u, p, h, width) -> x` advances by `h` s under midpoint inputs `u`;
+    `output(x, u, p, h, width) -> y` predicts the recorded output channels;
+    `tick(x, u, p, kind) -> x` lets a sampled controller compute (kind 1) or apply (kind 2);
+    `start(q, v, u, p) -> x` makes a state from the angles and speeds of the groups.
+    """
+
+    mechanism: Mechanism
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    step: ca.Function
+    output: ca.Function
+    tick: ca.Function | None
+    start: ca.Function
+
+
+@dataclass(frozen=True)
+class _State:
+    """The state vector and its slices as expressions."""
+
+    x: ca.SX
+    angles: ca.SX
+    speeds: ca.SX
+    bristle: ca.SX
+    extra: ca.SX
+    memory: ca.SX
+
+
+def _state(mech: Mechanism) -> _State:
+    sizes = (
+        len(mech.angle_groups),
+        len(mech.free_groups),
+        len(mech.bristles),
+        len(mech.extra_names),
+        len(mech.memory_names),
+    )
+    parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]  # pyright: ignore[reportArgumentType]
+    return _State(ca.vertcat(*parts), *parts)
+
+
+def _angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
+    where_is = {g: k for k, g in enumerate(mech.angle_groups)}
+    groups = range(len(mech.topology.roots))
+    return column([angles[where_is[g]] if g in where_is else _prescribed(mech, g, "theta") for g in groups])
+
+
+def _speeds(mech: Mechanism, speeds: ca.SX) -> ca.SX:
+    where_is = {g: k for k, g in enumerate(mech.free_groups)}
+    groups = range(len(mech.topology.roots))
+    return column([speeds[where_is[g]] if g in where_is else _prescribed(mech, g, "omega") for g in groups])
+
+
+def _prescribed(mech: Mechanism, group: int, signal: str) -> Any:
+    """Return the angle or speed of a driven group, in terms of its first shaft."""
+    channel = next(
+        item
+        for item in mech.drive.inputs
+        if item.signal == mech.prescribed[group] and mech.topology.group_of.get(item.part) == group
+    )
+    ratio = mech.topology.speed_ratio[channel.part]
+    if signal == "omega" and channel.signal == "theta":
+        return mech.inputs[f"{channel.name}'"] / channel.gain / ratio
+    return (mech.inputs[channel.name] - channel.offset) / channel.gain / ratio
+
+
+def _passes(mech: Mechanism) -> int:
+    """One pass suffices where nothing but the own speed couples into the speed update."""
+    coupled = bool(mech.topology.elastic) or bool(mech.bristles) or bool(mech.extra_names)
+    return 2 if coupled else 1
+
+
+def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> ca.SX:
+    q0, v0 = _angles(mech, state.angles), _speeds(mech, state.speeds)
+    free_angles = state.angles + 0.5 * h * _pick(v0, mech.angle_groups)
+    middle, mean = _angles(mech, free_angles), v0
+    bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    extra, v1, load = state.extra, v0, dict[str, Any]()
+    for _ in range(_passes(mech)):
+        at = Motion(middle, mean, extra, state.memory)
+        done = kick(mech, Step(h, v0, at, bristle, width))
+        v1, load = done.v, done.load
+        mean = 0.5 * (v0 + v1)
+        extra = 0.5 * (state.extra + _advance_extra(mech, state, Motion(middle, mean, state.extra, state.memory), h))
+    after = 2.0 * extra - state.extra
+    angles = free_angles + 0.5 * h * _pick(v1, mech.angle_groups)
+    deflections = _advance_bristles(mech, state, mean, h, load)
+    return ca.vertcat(angles, _pick(v1, mech.free_groups), deflections, after, state.memory)
+
+
+def _pick(vector: ca.SX, groups: tuple[int, ...]) -> ca.SX:
+    return column([vector[g] for g in groups])
+
+
+def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.SX:
+    """Linearly implicit midpoint step of the currents and integrals, each by its own time constant."""
+    if not mech.extra_names:
+        return state.extra
+    rates = mech.extra_rates(at)
+    own = column([ca.jacobian(rates[k], state.extra[k]) for k in range(rates.numel())])
+    return state.extra + h * rates / (1.0 - 0.5 * h * own)
+
+
+def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, load: dict[str, Any]) -> ca.SX:
+    after: list[Any] = []
+    for k, shaft in enumerate(mech.bristles):
+        omega = mech.shaft_speed(shaft.name, mean)
+        transmitted = transmitted_torque(mech, shaft, load)
+        after.append(shaft.friction.advance(h, omega, omega, state.bristle[k], transmitted))
+    return column(after)
+
+
+def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> ca.SX:
+    q, v = _angles(mech, state.angles), _speeds(mech, state.speeds)
+    at = Motion(q, v, state.extra, state.memory)
+    bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    acceleration = (kick(mech, Step(h, v, at, bristle, width)).v - v) / h
+    return column([_recorded(mech, channel, at, acceleration) for channel in mech.drive.outputs])
+
+
+def _recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
+    """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives."""
+    value, rate, curvature = _signal(mech, channel, at, acceleration)
+    delayed = value - channel.delay * rate + 0.5 * channel.delay**2 * curvature
+    return channel.gain * delayed + channel.offset
+
+
+def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> tuple[Any, Any, Any]:
+    if channel.part in mech.topology.group_of:
+        omega = mech.shaft_speed(channel.part, at.v)
+        alpha = mech.shaft_speed(channel.part, acceleration)
+        signals = {"theta": (mech.shaft_angle(channel.part, at), omega, alpha), "omega": (omega, alpha, 0.0)}
+        return signals.get(channel.signal, (alpha, 0.0, 0.0))
+    motor = mech.drive.motor(channel.part)
+    value = {
+        "current": mech.motor_current,
+        "torque": mech.motor_torque,
+        "voltage": mech.motor_voltage,
+    }[channel.signal](motor, at)
+    return value, 0.0, 0.0
+
+
+def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
+    controller = mech.drive.controller
+    assert controller is not None
+    at = Motion(_angles(mech, state.angles), _speeds(mech, state.speeds), state.extra, state.memory)
+    memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
+    computed, applied = compute_tick(controller, mech.seen(at), memory), apply_tick(controller, memory)
+    chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
+    return ca.vertcat(state.angles, state.speeds, state.bristle, state.extra, column(chosen))
+
+
+def _start(mech: Mechanism, q: ca.SX, v: ca.SX) -> ca.SX:
+    """Return the state at given angles and speeds: bristles fully deflected by motion, controller at rest."""
+    at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
+    memory = [_first_memory(mech.seen(at), name) for name in mech.memory_names]
+    return ca.vertcat(
+        _pick(q, mech.angle_groups),
+        _pick(v, mech.free_groups),
+        ca.SX.zeros(len(mech.bristles)),
+        ca.SX.zeros(len(mech.extra_names)),
+        column(memory),
+    )
+
+
+def _first_memory(seen: ControlSignals, name: str) -> Any:
+    return seen.theta if name.startswith("controller.previous") else 0.0
+
+
+def stepped(drive: Drive) -> SteppedDrive:
+    """Return the discrete-time functions of a drive."""
+    mech = mechanism(drive)
+    state = _state(mech)
+    groups = len(mech.topology.roots)
+    u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
+    h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")  # pyright: ignore[reportArgumentType]
+    q, v = (ca.SX.sym(name, groups) for name in ("q", "v"))  # pyright: ignore[reportArgumentType]
+    advance = _advance(mech, state, h, width)
+    tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
+    return SteppedDrive(
+        mechanism=mech,
+        state_names=mech.state_names,
+        input_names=tuple(mech.inputs),
+        parameter_names=tuple(mech.parameters),
+        output_names=tuple(channel.name for channel in mech.drive.outputs),
+        step=ca.Function("step", [state.x, u, p, h, width], [advance]),
+        output=ca.Function("output", [state.x, u, p, h, width], [_outputs(mech, state, h, width)]),
+        tick=tick,
+        start=ca.Function("start", [q, v, u, p], [_start(mech, q, v)]),
+    )

@@ -1,0 +1,72 @@
+"""An identification problem: a drive, its recordings and how to fit them. Frozen; everything else reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.recording.recording import Recording
+
+Fit = Literal["simulation", "relaxed"]
+Solver = Literal["gauss_newton", "ipopt"]
+Loss = Literal["squares", "absolute", "huber", "student_t"]
+InitialState = Literal["estimated", "measured"]
+
+
+@dataclass(frozen=True)
+class RecordingUse:
+    """A recording and the numbers of the drive that are known but differ in it."""
+
+    recording: Recording
+    set: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Values by parameter path, in SI units."""
+
+    @property
+    def name(self) -> str:
+        """Name of the recording in results."""
+        return self.recording.name
+
+
+@dataclass(frozen=True)
+class EstimationOptions:
+    """How the fit is made; the defaults need no expert."""
+
+    solver: Solver = "gauss_newton"
+    fit: Fit | None = None
+    """`simulation` fits the free run over the whole recording, `relaxed` short segments joined by process noise;
+    None chooses: relaxed where a drive without feedback drifts under its measured input."""
+    segment: int = 50
+    """Samples in a segment of the relaxed problem."""
+    process_noise: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Torque noise by shaft, N m/sqrt(Hz)."""
+    loss: Loss = "squares"
+    horizon_s: float | None = None
+    initial_state: InitialState = "estimated"
+    starts: int = 1
+    seed: int = 0
+    max_iterations: int = 100
+    max_step: float | None = None
+    """Longest integrator step, s; None chooses it from the fastest mode of the drive."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What `check`, `simulate` and `identify` work on."""
+
+    title: str
+    drive: Drive
+    train: tuple[RecordingUse, ...]
+    validation: tuple[RecordingUse, ...] = ()
+    estimation: EstimationOptions = EstimationOptions()
+    constraints: tuple[str, ...] = ()
+    question: str = ""
+    """The comment at the head of the problem file: what is asked and what is known."""
+    path: Path | None = None
+
+    @property
+    def recordings(self) -> tuple[RecordingUse, ...]:
+        """All recordings, training first."""
+        return self.train + self.validation

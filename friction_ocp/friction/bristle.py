@@ -1,0 +1,72 @@
+"""Friction laws with an elastic bristle whose deflection is a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.static import stribeck_share
+from friction_ocp.parameters import Value, quantity
+
+
+@dataclass(frozen=True)
+class LuGre(AbstractFrictionLaw):
+    r"""LuGre friction: bristle deflection z with Stribeck weakening.
+
+    .. math::
+        \dot z = \omega - \frac{\sigma_0 |\omega|}{g(\omega)} z, \qquad
+        \tau_f = \sigma_0 z + \sigma_1 \dot z + \sigma_2 \omega, \qquad
+        g = \tau_c + (\tau_s - \tau_c) e^{-(|\omega| / \omega_s)^\delta}
+
+    With directional values sigma0 and sigma1 follow the sign of z, g and sigma2 the sign of omega.
+
+    Source: Canudas de Wit et al. 1995; in the form of Kumar & Banavar 2011, eqs. 2-4.
+    """
+
+    tau_c: Value = quantity("torque", "Coulomb friction")
+    tau_s: Value = quantity("torque", "breakaway torque")
+    omega_s: Value = quantity("speed", "Stribeck speed")
+    sigma0: Value = quantity("stiffness", "bristle stiffness")
+    sigma1: Value = quantity("viscous", "bristle damping", 0.0)
+    sigma2: Value = quantity("viscous", "viscous friction", 0.0)
+    delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0)
+    name: ClassVar[str] = "lugre"
+    has_bristle: ClassVar[bool] = True
+
+    def weakening(self, speed: Any) -> Any:
+        return stribeck_share(speed, self.omega_s, self.delta)
+
+    def level(self, speed: Any) -> Any:
+        """Return g(speed), the torque of the fully deflected bristle."""
+        return self.tau_c + (self.tau_s - self.tau_c) * self.weakening(speed)
+
+    def magnitude(self, speed: Any) -> Any:
+        return self.level(speed) + self.sigma2 * speed
+
+
+@dataclass(frozen=True)
+class Dahl(AbstractFrictionLaw):
+    r"""Dahl friction: a bristle without weakening or damping.
+
+    .. math:: \dot z = \omega - \frac{\sigma_0 |\omega|}{\tau_c} z, \qquad \tau_f = \sigma_0 z + \sigma_2 \omega
+
+    Source: Dahl 1968, with exponent 1.
+    """
+
+    tau_c: Value = quantity("torque", "Coulomb friction")
+    sigma0: Value = quantity("stiffness", "bristle stiffness")
+    sigma2: Value = quantity("viscous", "viscous friction", 0.0)
+    name: ClassVar[str] = "dahl"
+    has_bristle: ClassVar[bool] = True
+    sigma1: ClassVar[float] = 0.0
+
+    def level(self, speed: Any) -> Any:
+        """Return the torque of the fully deflected bristle."""
+        return self.tau_c + 0.0 * speed
+
+    def magnitude(self, speed: Any) -> Any:
+        return self.level(speed) + self.sigma2 * speed
+
+
+BristleLaw = LuGre | Dahl

@@ -1,0 +1,143 @@
+"""A friction law at its place on a shaft: directions, load dependence, and its response over one step.
+
+Over a step of length h every law reduces to
+    torque = offset + slope * mean speed + a set-valued part in [-lower, upper],
+the form in which the integrator solves for the new speed in closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from friction_ocp.friction.bristle import Dahl, LuGre
+from friction_ocp.friction.law import AbstractFrictionLaw, Direction
+from friction_ocp.friction.smoothing import positive_part, smooth_abs, smooth_sign, where
+from friction_ocp.friction.static import NoFriction
+from friction_ocp.parameters import Directional, Value, inline, quantity
+
+
+@dataclass(frozen=True)
+class LoadDependence:
+    """Friction that grows with the torque transmitted by the shaft; each is a share of that torque.
+
+    Source: Gautier & Jubien 2014; Duclusaud et al. 2025 (load-dependent Coulomb and Stribeck friction of servos).
+    """
+
+    coulomb: Value = quantity("dimensionless", "Coulomb friction per transmitted torque", 0.0)
+    stribeck: Value = quantity("dimensionless", "Stribeck friction per transmitted torque", 0.0)
+    viscous: Value = quantity("load_viscous", "viscous friction per transmitted torque", 0.0)
+
+    def along(self, direction: Direction) -> LoadDependence:
+        """Return the shares of one direction of motion."""
+
+        def pick(value: Value) -> Value:
+            return getattr(value, direction) if isinstance(value, Directional) else value
+
+        return LoadDependence(pick(self.coulomb), pick(self.stribeck), pick(self.viscous))
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """Torque of a friction element over one step: offset + slope * mean speed + [-lower, upper]."""
+
+    offset: Any
+    slope: Any
+    upper: Any
+    lower: Any
+
+
+@dataclass(frozen=True)
+class FrictionElement:
+    """One law on one shaft, its values bound to numbers or SX."""
+
+    law: AbstractFrictionLaw = inline()
+    load: LoadDependence | None = None
+
+    def magnitude(self, direction: Direction, speed: Any, transmitted: Any) -> Any:
+        """Return the steady-state torque at `speed` >= 0 under the torque |transmitted|."""
+        law = self.law.along(direction)
+        return law.magnitude(speed) + self._load_level(direction, speed, transmitted, with_viscous=True)
+
+    def _load_level(self, direction: Direction, speed: Any, transmitted: Any, with_viscous: bool) -> Any:
+        if self.load is None:
+            return 0.0
+        load, law = self.load.along(direction), self.law.along(direction)
+        share = load.coulomb + load.stribeck * law.weakening(speed)
+        return transmitted * (share + load.viscous * speed if with_viscous else share)
+
+    def torque(self, omega: Any, transmitted: Any = 0.0, width: Any = 0.0) -> Any:
+        """Return the steady-state friction torque at the signed speed `omega`, its jump rounded over `width`."""
+        speed = smooth_abs(omega)
+        positive, negative = (self.magnitude(side, speed, transmitted) for side in ("positive", "negative"))
+        return smooth_sign(omega, width) * where(omega >= 0, positive, negative)
+
+    def forgetting_rate(self, omega: Any, deflection: Any, transmitted: Any) -> Any:
+        """Return sigma0 |omega| / g(omega), the rate at which the bristle forgets its deflection."""
+        speed = smooth_abs(omega)
+        levels = [
+            law.level(speed) + self._load_level(side, speed, transmitted, with_viscous=False)
+            for side, law in self._bristles()
+        ]
+        return self._sigma(0, deflection) * speed / where(omega >= 0, levels[0], levels[1])
+
+    def _bristles(self) -> list[tuple[Direction, LuGre | Dahl]]:
+        sides: list[tuple[Direction, LuGre | Dahl]] = []
+        for side in ("positive", "negative"):
+            law = self.law.along(side)
+            assert isinstance(law, (LuGre, Dahl))
+            sides.append((side, law))
+        return sides
+
+    def _sigma(self, order: int, sign_of: Any) -> Any:
+        (_, positive), (_, negative) = self._bristles()
+        return where(sign_of >= 0, getattr(positive, f"sigma{order}"), getattr(negative, f"sigma{order}"))
+
+    def bristle_torque(self, omega: Any, deflection: Any, transmitted: Any = 0.0) -> tuple[Any, Any]:
+        """Return the torque of a bristle law and the rate of change of its deflection."""
+        rate = omega - self.forgetting_rate(omega, deflection, transmitted) * deflection
+        elastic = self._sigma(0, deflection) * deflection + self._sigma(1, deflection) * rate
+        return elastic + self._viscous(omega, transmitted) * omega, rate
+
+    def _viscous(self, omega: Any, transmitted: Any) -> Any:
+        viscous = self._sigma(2, omega)
+        if self.load is None:
+            return viscous
+        sides = [self.load.along(side).viscous for side in ("positive", "negative")]
+        return viscous + transmitted * where(omega >= 0, sides[0], sides[1])
+
+    def step_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
+        """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""
+        if isinstance(self.law, NoFriction):
+            return StepResponse(0.0, 0.0, 0.0, 0.0)
+        if self.law.has_bristle:
+            return self._bristle_response(h, omega, deflection, transmitted)
+        return self._static_response(omega, transmitted)
+
+    def _static_response(self, omega: ca.SX, transmitted: Any) -> StepResponse:
+        levels: list[Any] = []
+        slopes: list[Any] = []
+        for side, sign in (("positive", 1.0), ("negative", -1.0)):
+            speed = ca.SX.sym("speed")  # pyright: ignore[reportArgumentType]
+            level = ca.SX(self.magnitude(side, speed, transmitted))
+            slope = ca.jacobian(level, speed)
+            now = positive_part(sign * omega)
+            level, slope = (ca.substitute(term, speed, now) for term in (level, slope))
+            slopes.append(where(sign * omega >= 0, slope, 0.0))
+            levels.append(level - slopes[-1] * now)
+        slope = where(omega >= 0, slopes[0], slopes[1])
+        return StepResponse(0.0, slope, levels[0], levels[1])
+
+    def _bristle_response(self, h: Any, omega: Any, deflection: Any, transmitted: Any) -> StepResponse:
+        sigma1 = self._sigma(1, deflection)
+        rate = self.forgetting_rate(omega, deflection, transmitted)
+        stiffness = (self._sigma(0, deflection) - sigma1 * rate) / (1.0 + 0.5 * h * rate)
+        slope = 0.5 * h * stiffness + sigma1 + self._viscous(omega, transmitted)
+        return StepResponse(stiffness * deflection, slope, 0.0, 0.0)
+
+    def advance(self, h: Any, omega: Any, mean_omega: Any, deflection: Any, transmitted: Any) -> Any:
+        """Return the deflection after a step: implicit midpoint, the forgetting rate frozen at `omega`."""
+        half = 0.5 * h * self.forgetting_rate(omega, deflection, transmitted)
+        return (deflection * (1.0 - half) + h * mean_omega) / (1.0 + half)

@@ -1,0 +1,50 @@
+"""What a friction law is, and its one sign convention.
+
+Friction torque opposes the speed and is subtracted in the equation of motion:
+J domega/dt = tau_applied - tau_friction. A law states the magnitude of that torque at speeds >= 0, once;
+directions, load and set-valuedness at standstill are added around it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+from friction_ocp.parameters import Directional
+
+Direction = Literal["positive", "negative"]
+
+
+def _toward(value: Any, direction: Direction) -> Any:
+    if isinstance(value, Directional):
+        return value.positive if direction == "positive" else value.negative
+    if isinstance(value, tuple):
+        return tuple(_toward(item, direction) for item in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    return value
+
+
+@dataclass(frozen=True)
+class AbstractFrictionLaw(ABC):
+    """Friction torque of a shaft as a function of its speed (and of a bristle state)."""
+
+    name: ClassVar[str]
+    has_bristle: ClassVar[bool] = False
+
+    @abstractmethod
+    def magnitude(self, speed: Any) -> Any:
+        """Return the steady-state torque magnitude at `speed` >= 0; its value at 0 is the breakaway torque."""
+
+    def weakening(self, speed: Any) -> Any:
+        """Return the Stribeck share at `speed` >= 0: 1 at standstill, 0 far above the Stribeck speed."""
+        return 0.0 * speed
+
+    def along(self, direction: Direction) -> Self:
+        """Return the law of one direction of motion, without directional values."""
+        changes = {
+            item.name: _toward(getattr(self, item.name), direction)
+            for item in dataclasses.fields(self)
+            if "kind" in item.metadata
+        }
+        return dataclasses.replace(self, **changes)

@@ -1,0 +1,62 @@
+"""Arithmetic of friction that runs alike on floats, arrays and SX.
+
+`width` is the speed (or twist) over which a jump is smoothed; 0 gives the exact, set-valued law.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+TINY = 1e-30
+
+
+def where(condition: Any, yes: Any, no: Any) -> Any:
+    """Choose elementwise; SX conditions become `if_else`."""
+    if isinstance(condition, ca.SX):
+        return ca.if_else(condition, yes, no)
+    return np.where(condition, yes, no)
+
+
+def exp(value: Any) -> Any:
+    """e**value."""
+    return ca.exp(value) if isinstance(value, ca.SX) else np.exp(value)
+
+
+def sqrt(value: Any) -> Any:
+    """Square root."""
+    return ca.sqrt(value) if isinstance(value, ca.SX) else np.sqrt(value)
+
+
+def smooth_abs(value: Any, width: Any = 0.0) -> Any:
+    """|value|, rounded below `width`, with a finite derivative at zero."""
+    return sqrt(value * value + width * width + TINY)
+
+
+def smooth_sign(value: Any, width: Any) -> Any:
+    """sign(value) rounded over `width`."""
+    return value / smooth_abs(value, width)
+
+
+def soft_threshold(value: Any, upper: Any, lower: Any, width: Any = 0.0) -> Any:
+    """Solve v + F(v) = value for v, F the set-valued sign that jumps from -lower to upper at 0.
+
+    The result is 0 while -lower <= value <= upper (sticking), value - upper above and value + lower
+    below; `width` rounds the two corners. The same function is the dead zone of a backlash.
+    """
+    above = smooth_abs(value - upper, width)
+    below = smooth_abs(value + lower, width)
+    return value + 0.5 * (above - below + lower - upper)
+
+
+def positive_part(value: Any) -> Any:
+    """max(value, 0)."""
+    return np.fmax(value, 0.0) if not isinstance(value, ca.SX) else ca.fmax(value, 0.0)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """base**exponent for base >= 0 with finite derivatives at base = 0."""
+    logarithm = 0.5 * (ca.log if isinstance(base, ca.SX) else np.log)(base * base + 1e-16)
+    return exp(exponent * logarithm)

@@ -1,0 +1,120 @@
+"""Parameters of a drive: what is fixed, fitted or tied, and the paths that name them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+Scope = Literal["shared", "recording"]
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Free:
+    """A fitted parameter: its start, bounds and prior, in SI units."""
+
+    guess: float
+    min: float = -math.inf
+    max: float = math.inf
+    prior_std: float | None = None
+    prior_mean: float | None = None
+    scope: Scope = "shared"
+
+    @property
+    def centre(self) -> float:
+        """Mean of the prior: `prior_mean`, else the guess of the file."""
+        return self.guess if self.prior_mean is None else self.prior_mean
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A parameter computed from others by an arithmetic expression over their paths."""
+
+    expr: str
+
+
+@dataclass(frozen=True)
+class Directional:
+    """A friction parameter that differs by the direction of motion."""
+
+    positive: Any
+    negative: Any
+
+
+Value = Any
+"""float, Free, Tie or Directional in a drive as read; float or SX in a drive whose values are bound."""
+
+
+def quantity(kind: str, meaning: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader."""
+    return dataclasses.field(default=default, metadata={"kind": kind, "meaning": meaning})
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One number of a drive and the path that names it."""
+
+    path: str
+    value: Value
+    kind: str
+    meaning: str
+    motion: str = "rotary"
+
+
+def inline() -> Any:
+    """Declare a field whose part adds no name of its own to the paths of its numbers."""
+    return dataclasses.field(metadata={"inline": True})
+
+
+def _path(prefix: str, item: dataclasses.Field[Any]) -> str:
+    return prefix if item.metadata.get("inline") else f"{prefix}.{item.name}"
+
+
+def _is_part(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, (type, Free, Tie, Directional))
+
+
+def _split(value: Value, path: str) -> Iterator[tuple[str, Value]]:
+    if isinstance(value, Directional):
+        yield f"{path}.positive", value.positive
+        yield f"{path}.negative", value.negative
+    elif isinstance(value, tuple):
+        for index, item in enumerate(value):  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+            yield from _split(item, f"{path}.{index}")
+    else:
+        yield path, value
+
+
+def leaves(part: Any, prefix: str, motion: str = "rotary") -> Iterator[Leaf]:
+    """Yield every number of a part, depth first; absent optional numbers (None) are left out."""
+    for item in dataclasses.fields(part):
+        value, path = getattr(part, item.name), _path(prefix, item)
+        if "kind" in item.metadata:
+            for leaf_path, leaf in _split(value, path):
+                if leaf is not None and not isinstance(leaf, str):
+                    yield Leaf(leaf_path, leaf, item.metadata["kind"], item.metadata["meaning"], motion)
+        elif _is_part(value):
+            yield from leaves(value, path, motion)
+
+
+def _bound(value: Value, path: str, values: Mapping[str, Any]) -> Any:
+    if isinstance(value, Directional):
+        return Directional(values[f"{path}.positive"], values[f"{path}.negative"])
+    if isinstance(value, tuple):
+        return tuple(_bound(item, f"{path}.{k}", values) for k, item in enumerate(value))  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    return values.get(path, value)
+
+
+def bind(part: Part, prefix: str, values: Mapping[str, Any]) -> Part:
+    """Return the part with every number replaced by `values[path]` (floats or SX)."""
+    changes: dict[str, Any] = {}
+    for item in dataclasses.fields(part):  # pyright: ignore[reportArgumentType]
+        value, path = getattr(part, item.name), _path(prefix, item)
+        if "kind" in item.metadata:
+            changes[item.name] = _bound(value, path, values)
+        elif _is_part(value):
+            changes[item.name] = bind(value, path, values)
+    return dataclasses.replace(part, **changes)  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,189 @@
+"""What a signal says of itself before any model: noise floor, resolution, clipping, smooth motion."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import interpolate, linalg
+
+from friction_ocp.recording.recording import FloatArray
+
+CubicSpline: Any = interpolate.CubicSpline
+solveh_banded: Any = linalg.solveh_banded
+
+_MAD_TO_STD = 1.4826
+_MIN_LEVELS = 5
+
+
+def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
+    """Return the standard deviation of white noise on a smooth signal, NaN where there are too few samples.
+
+    Fourth divided differences, scaled to unit noise gain, remove any local cubic; their median absolute deviation is
+    robust against steps and spikes. A signal that rests on one value says nothing there. Of a quantised signal nothing
+    below resolution / sqrt(12) is returned. Zero means that no noise is to be seen; noise slower than five samples
+    never is.
+    """
+    t, y = _present(time, values)
+    if len(t) < 9:
+        return float("nan")
+    residual = _fourth_differences(t, y)
+    windows = np.lib.stride_tricks.sliding_window_view(y, 5)
+    moving = residual[np.ptp(windows, axis=1) > 0.0]
+    if not len(moving):
+        return 0.0
+    if len(np.unique(y)) < _MIN_LEVELS:
+        return _MAD_TO_STD * float(np.median(np.abs(residual)))
+    robust = _MAD_TO_STD * float(np.median(np.abs(moving)))
+    resolution = detect_resolution(y)
+    if resolution is None or robust > resolution:
+        return robust
+    within = residual[np.abs(residual) <= 3.0 * resolution]
+    return max(resolution / np.sqrt(12.0), float(np.sqrt(np.mean(within**2))))
+
+
+def detect_resolution(values: npt.ArrayLike) -> float | None:
+    """Return the step whose integer multiples, from any offset, all values are; None if there is none.
+
+    Fewer than five levels are no evidence: a command that switches is not a coarse sensor.
+    """
+    y = np.asarray(values, dtype=np.float64)
+    levels = np.unique(y[np.isfinite(y)])
+    if len(levels) < _MIN_LEVELS:
+        return None
+    rounding = 8.0 * np.finfo(np.float64).eps * float(np.max(np.abs(levels)))
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > rounding]
+    if len(gaps) < _MIN_LEVELS - 1:
+        return None
+    step = _common_divisor(gaps, rounding)
+    if step is None:
+        return None
+    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
+    return float(np.sum(gaps) / counts[-1])
+
+
+def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
+    """Tell whether the signal runs into its highest or lowest value and stays there, while it moves otherwise.
+
+    Only runs of equal extremes count that are longer than runs elsewhere and are reached or left in full motion: neither
+    a rest nor the flat top of a quantised sine is. A commanded plateau looks the same as clipping.
+    """
+    y = np.asarray(values, dtype=np.float64)
+    y = y[np.isfinite(y)]
+    if len(y) < 10 or float(np.ptp(y)) == 0.0:
+        return False
+    at_extreme = (y == np.max(y)) | (y == np.min(y))
+    if np.mean(at_extreme) < min_share or np.mean(~at_extreme) < 0.1:
+        return False
+    runs = _runs(y)
+    usual = np.quantile([stop - start for start, stop in runs if not at_extreme[start]], 0.9)
+    long = [(start, stop) for start, stop in runs if at_extreme[start] and stop - start > max(2.0, 2.0 * usual)]
+    resolution = detect_resolution(y) or 0.0
+    stuck = sum(stop - start for start, stop in long if _is_abrupt(y, at_extreme, start, stop, resolution))
+    return stuck >= min_share * len(y)
+
+
+def smooth_motion(
+    time: npt.ArrayLike, values: npt.ArrayLike, cutoff_hz: float | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return position, speed and acceleration, (n,) each, of a cubic smoothing spline.
+
+    It shifts no phase; its gain is 1/2 at the cutoff and falls with the fourth power of frequency above it. Without a cutoff the spline is as smooth as the noise floor allows: it leaves a residual of `high_frequency_noise`.
+    Missing samples are bridged; the acceleration is zero at both ends. Source: Reinsch 1967.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    t_present, y = _present(time, values)
+    if len(t_present) < 5:
+        raise ValueError(f"{len(t_present)} samples are too few for a smooth motion; 5 are needed")
+    step = float(np.mean(np.diff(t_present)))
+    if cutoff_hz is None:
+        penalty = _penalty_for_noise(t_present / step, y, high_frequency_noise(t_present, y))
+    else:
+        penalty = (2.0 * np.pi * cutoff_hz * step) ** -4
+    smooth = y if penalty == 0.0 else _reinsch(t_present / step, y, penalty)
+    spline = CubicSpline(t_present, smooth, bc_type="natural")
+    theta, omega, alpha = (np.asarray(spline(t, order), dtype=np.float64) for order in range(3))
+    return theta, omega, alpha
+
+
+def _present(time: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    t, y = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    present = np.isfinite(y) & np.isfinite(t)
+    return t[present], y[present]
+
+
+def _fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
+    """Return fourth divided differences over five neighbours, scaled so that white noise keeps its deviation."""
+    times = np.lib.stride_tricks.sliding_window_view(t / np.mean(np.diff(t)), 5)
+    distance = times[:, :, None] - times[:, None, :]
+    weights = 1.0 / np.prod(distance + np.eye(5), axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    return np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), axis=1)
+
+
+def _common_divisor(gaps: FloatArray, rounding: float) -> float | None:
+    """Return the largest step of which all gaps are multiples within rounding, by Euclid's algorithm."""
+    total = float(np.sum(gaps))
+    rest = gaps
+    while True:
+        step = float(np.min(rest))
+        tolerance = max(0.02 * step, rounding)
+        if step < 20.0 * rounding or total / step > 1e9:
+            return None
+        remainder = np.abs(gaps - step * np.round(gaps / step))
+        if np.all(remainder <= tolerance):
+            return step
+        rest = remainder[remainder > tolerance]
+
+
+def _runs(y: FloatArray) -> list[tuple[int, int]]:
+    """Return start and stop of every run of equal values."""
+    changes = np.flatnonzero(np.diff(y) != 0.0) + 1
+    return list(pairwise([0, *(int(change) for change in changes), len(y)]))
+
+
+def _is_abrupt(y: FloatArray, at_extreme: npt.NDArray[np.bool_], start: int, stop: int, resolution: float) -> bool:
+    """Tell whether the signal enters or leaves the run as fast as it moves elsewhere.
+
+    A parabola entered and left with slope s is s n / 4 high over n samples; a quantised one stays within a level or two.
+    """
+
+    def moves(reach: int) -> list[float]:
+        before = [abs(float(y[start] - y[start - reach]))] if start >= reach else []
+        return before + ([abs(float(y[stop - 1] - y[stop - 1 + reach]))] if stop - 1 + reach < len(y) else [])
+
+    reach = min(max((stop - start) // 2, 2), 5)
+    elsewhere = np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]
+    height = float(np.mean(moves(2) or [0.0])) / 2.0 * (stop - start) / 4.0
+    fastest = max(moves(reach), default=0.0)
+    return fastest > max(0.25 * float(np.median(elsewhere)), 4.0 * resolution) and height > 4.0 * resolution
+
+
+def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
+    """Return the minimiser of sum (y - f)^2 + penalty * integral f''^2 at the knots."""
+    h = np.diff(t)
+    lower, upper = 1.0 / h[:-1], 1.0 / h[1:]
+    middle = -lower - upper
+    bands = np.zeros((3, len(t) - 2))
+    bands[2] = (h[:-1] + h[1:]) / 3.0 + penalty * (lower**2 + middle**2 + upper**2)
+    bands[1, 1:] = h[1:-1] / 6.0 + penalty * (middle[:-1] * lower[1:] + upper[:-1] * middle[1:])
+    bands[0, 2:] = penalty * upper[:-2] * lower[2:]
+    curvature = np.asarray(solveh_banded(bands, np.diff(np.diff(y) / h)), dtype=np.float64)
+    padded = np.concatenate(([0.0], curvature, [0.0]))
+    slope = np.concatenate(([0.0], np.diff(padded) / h, [0.0]))
+    return y - penalty * np.diff(slope)
+
+
+def _penalty_for_noise(t: FloatArray, y: FloatArray, noise_std: float) -> float:
+    """Return the penalty that leaves a residual of the noise floor, by bisection on its logarithm."""
+    if not noise_std > 0.0:
+        return 0.0
+    low, high = -4.0, 12.0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        residual = float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**middle)) ** 2)))
+        low, high = (middle, high) if residual < noise_std else (low, middle)
+    return 10.0 ** (0.5 * (low + high))

@@ -1,0 +1,221 @@
+"""Delimited text: sniff its layout, read columns of numbers, make a recording of them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording.import_map import ImportMap
+from friction_ocp.recording.recording import FloatArray, Recording
+from friction_ocp.recording.table import Table, recording_of
+
+_DELIMITERS = ("\t", ";", ",", " ")
+_SNIFFED_LINES = 200
+_ROWS_AT_ONCE = 50_000
+_MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a delimited file is written."""
+
+    delimiter: str
+    """One character; " " is any run of spaces and tabs."""
+    names: tuple[str, ...]
+    first_row: int
+    """Line of the first row of numbers, from 1."""
+    encoding: str
+    decimal: str = "."
+
+
+@dataclass(frozen=True)
+class ColumnSummary:
+    """What one column of a file looks like."""
+
+    name: str
+    examples: tuple[str, ...]
+    numbers: int
+    """How many cells hold a number."""
+
+
+@dataclass(frozen=True)
+class CsvSummary:
+    """What a delimited file holds, for whoever is about to write its map."""
+
+    delimiter: str
+    columns: tuple[ColumnSummary, ...]
+    """In the order of the file: a column's place is its index."""
+    rows: int
+    rate: float | None
+    """Rows per unit of the first increasing column (median), or None."""
+
+
+def read_csv(path: str | Path, import_map: ImportMap) -> Recording:
+    """Read the mapped columns of delimited text into a recording in SI units."""
+    path = Path(path)
+    layout = sniff_layout(path, import_map.delimiter, import_map.decimal)
+    return recording_of(Table(layout.names, partial(_read_columns, path, layout)), import_map, path)
+
+
+def inspect_csv(path: str | Path, delimiter: str | None = None, decimal: str = ".") -> CsvSummary:
+    """List the columns of delimited text with examples, how many rows there are and their rate."""
+    path = Path(path)
+    layout = sniff_layout(path, delimiter, decimal)
+    width = len(layout.names)
+    first = [cells for _, cells in islice(_rows(path, layout), 3) if len(cells) == width]
+    chunks = [_numbers(cells, layout.decimal)[0] for _, cells in _chunks(path, layout, range(width), [])]
+    values = np.concatenate(chunks, axis=1) if chunks else np.empty((width, 0))
+    columns = tuple(
+        ColumnSummary(name, tuple(cells[index] for cells in first), int(np.isfinite(values[index]).sum()))
+        for index, name in enumerate(layout.names)
+    )
+    steps = [np.diff(column) for column in values]
+    increasing = [step for step in steps if step.size and bool(np.all(step > 0.0))]
+    rate = 1.0 / float(np.median(increasing[0])) if increasing else None
+    return CsvSummary(layout.delimiter, columns, values.shape[1], rate)
+
+
+def sniff_layout(path: Path, delimiter: str | None = None, decimal: str = ".") -> Layout:
+    """Find delimiter, header and first row of numbers; raises FrictionOcpError where there are none."""
+    if not path.is_file():
+        raise FrictionOcpError(Finding(str(path), "there is no such file", remedy="correct the path"))
+    encoding = _encoding(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as file:
+        lines = [line.rstrip("\r\n") for line in islice(file, _SNIFFED_LINES)]
+    candidates = [found for found in (_DELIMITERS if delimiter is None else (delimiter,)) if found != decimal]
+    splits = {candidate: [_split(line, candidate) for line in lines] for candidate in candidates}
+    best = max(candidates, key=lambda candidate: _count_numbers(splits[candidate]), default="")
+    if not best or _count_numbers(splits[best]) == 0:
+        allowed = "at least two columns, separated by comma, semicolon, tab or space"
+        raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
+    names, first_row = _header(splits[best])
+    return Layout(best, names, first_row + 1, encoding, decimal)
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as file:
+        head = file.read(65_536)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    try:
+        head[: head.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    return [cell.strip() for row in csv.reader([line], delimiter=delimiter, skipinitialspace=True) for cell in row]
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    return len(cells) > 1 and any(_NUMBER.fullmatch(cell) for cell in cells) and not cells[0].startswith("#")
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """Return how many cells most rows of numbers have."""
+    widths = Counter(len(cells) for cells in rows if _is_row(cells))
+    return widths.most_common(1)[0][0] if widths else 0
+
+
+def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
+    width = _width(rows)
+    return sum(bool(_NUMBER.fullmatch(cell)) for cells in rows if len(cells) == width for cell in cells)
+
+
+def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], int]:
+    """Return the names of the columns and the index of the first row of numbers.
+
+    The header is the first of the lines right above the numbers that have as many cells; a line of units may follow it.
+    """
+    width = _width(rows)
+    first = next(index for index, cells in enumerate(rows) if _is_row(cells) and len(cells) == width)
+    names: Sequence[str] = ()
+    for cells in reversed(rows[:first]):
+        bare = [cells[0].lstrip("# "), *cells[1:]] if cells else []
+        bare = bare[1:] if bare and not bare[0] and len(bare) == width + 1 else bare
+        if len(bare) != width:
+            break
+        names = bare
+    return tuple(name or f"column {index}" for index, name in enumerate(names or [""] * width)), first
+
+
+def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    """Yield line number and cells of every row; empty lines and lines that start with # are left out."""
+    with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
+        lines = islice(file, layout.first_row - 1, None)
+        if layout.delimiter == " ":
+            numbered = ((number, line.split()) for number, line in enumerate(lines, layout.first_row))
+        else:
+            reader = csv.reader(lines, delimiter=layout.delimiter, skipinitialspace=True)
+            numbered = ((layout.first_row - 1 + reader.line_num, cells) for cells in reader)
+        for number, cells in numbered:
+            if any(cells) and not cells[0].startswith("#"):
+                yield number, cells
+
+
+def _chunks(
+    path: Path, layout: Layout, indices: Sequence[int], findings: list[Finding]
+) -> Iterator[tuple[list[int], list[list[str]]]]:
+    """Yield line numbers and the cells of the wanted columns, many rows at once; rows of another width are findings."""
+    width = len(layout.names)
+    rows = _rows(path, layout)
+    try:
+        while chunk := list(islice(rows, _ROWS_AT_ONCE)):
+            for number, cells in chunk:
+                if len(cells) != width and len(findings) < 10:
+                    what = f"line {number} has {len(cells)} cells where {width} are expected"
+                    findings.append(Finding(str(path), what, remedy="complete or remove the line"))
+            whole = [(number, cells) for number, cells in chunk if len(cells) == width]
+            yield [number for number, _ in whole], [[cells[index] for _, cells in whole] for index in indices]
+    except csv.Error as error:
+        findings.append(Finding(str(path), f"this is not delimited text ({error})"))
+
+
+def _read_columns(path: Path, layout: Layout, indices: Sequence[int]) -> Mapping[int, FloatArray]:
+    """Read the wanted columns; raises FrictionOcpError for cells that are no numbers."""
+    findings: list[Finding] = []
+    chunks: list[FloatArray] = []
+    for lines, cells in _chunks(path, layout, indices, findings):
+        values, bad = _numbers(cells, layout.decimal)
+        chunks.append(values)
+        for column, row in bad[: max(0, 10 - len(findings))]:
+            cell, name = cells[column][row], layout.names[indices[column]]
+            comma = layout.decimal == "." and bool(_NUMBER.fullmatch(cell))
+            remedy = "set decimal: ','" if comma else "correct or empty the cell"
+            what = f"line {lines[row]}: '{cell}' in column '{name}' is not a number"
+            findings.append(Finding(str(path), what, remedy=remedy))
+    if findings:
+        raise FrictionOcpError(findings)
+    values = np.concatenate(chunks, axis=1)
+    return {index: values[row] for row, index in enumerate(indices)}
+
+
+def _numbers(columns: Sequence[Sequence[str]], decimal: str) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Return (columns, rows) numbers, NaN for empty cells, and the places of cells that are neither."""
+    bad: list[tuple[int, int]] = []
+    values = np.full((len(columns), len(columns[0]) if columns else 0), np.nan)
+    for index, cells in enumerate(columns):
+        texts = cells if decimal == "." else [cell.replace(decimal, ".") for cell in cells]
+        try:
+            values[index] = np.asarray(texts, dtype=np.float64)
+        except ValueError:
+            for row, text in enumerate(texts):
+                try:
+                    values[index, row] = float(text)
+                except ValueError:
+                    if text.strip().lower() not in _MISSING:
+                        bad.append((index, row))
+    return values, bad

@@ -1,0 +1,149 @@
+"""The map of an import: which column is which channel, and in what unit; the only place here that reads YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import yaml
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.quantities import dimension_of, to_si
+
+MAP_FORMAT = "friction-ocp-map/1"
+_TEXTS = ("title", "source", "licence", "delimiter", "decimal")
+_KEYS = ("format", "time", "channels", *_TEXTS)
+_COLUMN_KEYS = ("column", "unit", "scale")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table and its unit."""
+
+    column: str | int
+    """Its header, or its index from 0."""
+    unit: str
+    scale: str | None = None
+    """What one count is, such as "2*pi/4096 rad", for unit "counts"."""
+
+
+@dataclass(frozen=True)
+class ImportMap:
+    """How the columns of a table become the channels of a recording."""
+
+    time: Column
+    channels: Mapping[str, Column]
+    title: str = ""
+    source: str = ""
+    licence: str = ""
+    delimiter: str | None = None
+    """Sniffed when None; " " is any run of spaces and tabs."""
+    decimal: str = "."
+    where: str = "map"
+    """The file of the map, for findings."""
+
+
+def load_import_map(path: str | Path) -> ImportMap:
+    """Read a map from YAML; raises FrictionOcpError with everything that is wrong with it."""
+    where = str(path)
+    try:
+        content: object = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise FrictionOcpError(Finding(where, "there is no such map", remedy="correct the path")) from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise FrictionOcpError(Finding(where, f"this is not YAML ({' '.join(str(error).split())})")) from error
+    reader = _MapReader(where)
+    result = reader.read(content)
+    if result is None or reader.findings:
+        raise FrictionOcpError(reader.findings)
+    return result
+
+
+@dataclass
+class _MapReader:
+    where: str
+    findings: list[Finding] = field(default_factory=list[Finding])
+
+    def report(self, place: str, what: str, allowed: str = "", remedy: str = "") -> None:
+        where = f"{self.where}: {place}" if place else self.where
+        self.findings.append(Finding(where, what, allowed, remedy))
+
+    def read(self, content: object) -> ImportMap | None:
+        keys = self.mapping("", content, _KEYS)
+        if keys is None:
+            return None
+        if keys.get("format") != MAP_FORMAT:
+            self.report("format", f"format is '{keys.get('format', '')}'", f"'{MAP_FORMAT}' is read here")
+        texts = {key: self.text(key, keys[key]) for key in _TEXTS if key in keys}
+        if len(texts.get("delimiter", ",")) != 1:
+            what = f"the delimiter is {texts['delimiter']!r}"
+            self.report("delimiter", what, "one character; ' ' is any spaces and tabs", "leave it out to have it found")
+        if texts.get("decimal", ".") not in (".", ","):
+            self.report("decimal", f"unknown decimal sign '{texts['decimal']}'", "available: '.', ','")
+        time = self.column("time", keys.get("time"))
+        if time is not None and self.dimension("time", time) not in ("time", None):
+            self.report("time", f"unit '{time.unit}' does not measure time", "a unit such as s, ms or us")
+        channels = self.channels(keys.get("channels"))
+        if time is None or not channels:
+            return None
+        return ImportMap(time, channels, where=self.where, **cast(dict[str, Any], texts))
+
+    def channels(self, content: object) -> dict[str, Column]:
+        found = self.mapping("channels", content)
+        if found == {}:
+            self.report("channels", "there are no channels", "name: {column, unit}")
+        channels: dict[str, Column] = {}
+        for name, entry in (found or {}).items():
+            if "/" in name:
+                self.report(f"channels.{name}", "the name has a slash", "text without a slash", "rename it")
+            column = self.column(f"channels.{name}", entry)
+            if column is not None:
+                self.dimension(f"channels.{name}", column)
+                channels[name] = column
+        return channels
+
+    def column(self, place: str, content: object) -> Column | None:
+        keys = self.mapping(place, content, _COLUMN_KEYS)
+        if keys is None:
+            return None
+        for key in ("column", "unit"):
+            if key not in keys:
+                self.report(place, f"there is no {key}", "{column, unit}")
+        if not {"column", "unit"} <= keys.keys():
+            return None
+        name = keys["column"]
+        if isinstance(name, bool) or not isinstance(name, str | int) or name == "" or str(name).startswith("-"):
+            self.report(f"{place}.column", f"column is {name!r}", "a header, or an index from 0")
+            return None
+        scale = self.text(f"{place}.scale", keys["scale"]) if "scale" in keys else None
+        return Column(name, self.text(f"{place}.unit", keys["unit"]), scale)
+
+    def dimension(self, place: str, column: Column) -> str | None:
+        try:
+            return dimension_of(to_si((), column.unit, f"{self.where}: {place}", scale=column.scale)[1])
+        except FrictionOcpError as error:
+            self.findings += error.findings
+            return None
+
+    def text(self, place: str, content: object) -> str:
+        if isinstance(content, bool) or not isinstance(content, str | int | float):
+            self.report(place, f"this is {_kind(content)}", "text")
+            return ""
+        return str(content)
+
+    def mapping(self, place: str, content: object, keys: tuple[str, ...] = ()) -> dict[str, object] | None:
+        if not isinstance(content, dict):
+            what = "there is nothing" if content is None else f"this is {_kind(content)}"
+            self.report(place, what, f"a mapping of {', '.join(keys)}" if keys else "a mapping")
+            return None
+        found = {str(key): value for key, value in cast(dict[object, object], content).items()}
+        for key in found.keys() - set(keys) if keys else ():
+            self.report(place, f"unknown key '{key}'", f"available: {', '.join(keys)}")
+        return found
+
+
+def _kind(content: object) -> str:
+    kinds: dict[type, str] = {list: "a list", dict: "a mapping", type(None): "empty", str: "text"}
+    return kinds.get(type(content), repr(content))

@@ -1,0 +1,33 @@
+"""An independent simulator of drives that makes the test data; it shares no code with the package under test."""
+
+from .parts import PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission
+from .plant import Plant, PlantRun
+from .trajectories import (
+    Trajectory,
+    chirp,
+    constant,
+    multisine,
+    reversing_steps,
+    slow_sine,
+    staircase,
+    steps_and_multisine,
+)
+
+__all__ = [
+    "Plant",
+    "PlantController",
+    "PlantFriction",
+    "PlantMotor",
+    "PlantRun",
+    "PlantSensor",
+    "PlantShaft",
+    "PlantTransmission",
+    "Trajectory",
+    "chirp",
+    "constant",
+    "multisine",
+    "reversing_steps",
+    "slow_sine",
+    "staircase",
+    "steps_and_multisine",
+]

@@ -1,0 +1,84 @@
+"""Memory layout of the compiled kernels: signal and law codes, constants of a run, and its changing state.
+
+Both are records of fixed size: compiled once for every drive, and passed on as one pointer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+STATIC, BRISTLE, GMS = 0, 1, 2
+TAU_C, TAU_S, OMEGA_S, DELTA, VISCOUS, QUADRATIC, SIGMA0, SIGMA1, LOAD_C, LOAD_S, LOAD_V, PIECES = range(12)
+SLOPES, BREAKS, COLUMNS = 12, 20, 28
+CURRENT, TORQUE, VOLTAGE = 0, 1, 2
+THETA, OMEGA, ALPHA, MOTOR_CURRENT, MOTOR_TORQUE, MOTOR_VOLTAGE = range(6)
+P, PD, PI_VELOCITY, CASCADE, DUTY = range(5)
+SHAFTS, JOINTS, MOTORS, INPUTS, CONTROLLERS, SENSORS = 12, 12, 6, 24, 4, 32
+
+FLOAT, INT = np.float64, np.int64
+
+# g groups of rigidly joined shafts, s shafts, e elastic joints, m motors, i inputs, c controllers, n sensors
+MODEL = np.dtype(
+    [
+        ("step", FLOAT),
+        ("truth_every", INT),
+        ("groups", INT),
+        ("shafts", INT),
+        ("joints", INT),
+        ("motors", INT),
+        ("inputs", INT),
+        ("controllers", INT),
+        ("sensors", INT),
+        ("first", INT, (SHAFTS + 1,)),  # shafts of group g are shaft[first[g]:first[g + 1]], parents before children
+        ("shaft", INT, (SHAFTS,)),
+        ("parent", INT, (SHAFTS,)),  # rigid parent or -1
+        ("forward", INT, (SHAFTS,)),  # 1 where the parent is the motor side
+        ("scale", FLOAT, (SHAFTS,)),  # shaft speed = scale * group speed
+        ("group", INT, (SHAFTS,)),
+        ("inertia", FLOAT, (SHAFTS,)),
+        ("group_inertia", FLOAT, (SHAFTS,)),
+        (
+            "traits",
+            INT,
+            (SHAFTS, 3),
+        ),  # per group: set-valued, implicit in the joint torque, prescribed-speed input or -1
+        ("law", INT, (SHAFTS,)),
+        ("friction", FLOAT, (SHAFTS, 2, COLUMNS)),  # by direction
+        ("applied", FLOAT, (SHAFTS, 3)),  # gravity torque, gravity phase, constant torque
+        ("external", INT, (SHAFTS,)),  # input or -1
+        ("noise_std", FLOAT, (SHAFTS,)),  # torque held for one step
+        ("joint", INT, (JOINTS, 2)),  # from, to
+        ("elastic", FLOAT, (JOINTS, 4)),  # ratio, stiffness, damping, half the free play
+        ("motor", INT, (MOTORS, 5)),  # shaft, drive, input, controller, enable input
+        ("winding", FLOAT, (MOTORS, 5)),  # torque constant, resistance, inductance, share, bias
+        ("signal", INT, (INPUTS + 1,)),  # offsets into the time and value arrays
+        ("signal_linear", INT, (INPUTS,)),
+        ("controller", INT, (CONTROLLERS, 6)),  # type, feedback, rate feedback, delay steps, two taps, anti-windup
+        ("gain", FLOAT, (CONTROLLERS, 7)),  # kp, ki, kd, low, high, supply, sample time
+        ("tick", INT, (CONTROLLERS + 1,)),  # offsets into the references
+        ("sensor", INT, (SENSORS, 2)),  # signal code, shaft or motor
+        ("scaling", FLOAT, (SENSORS, 3)),  # gain, offset, resolution
+        ("sample", INT, (SENSORS + 1,)),  # offsets into the samples
+    ],
+    align=True,
+)
+
+STATE = np.dtype(
+    [
+        ("theta", FLOAT, (SHAFTS, 3)),  # per group: now, at the start of the step, at mid step
+        ("omega", FLOAT, (SHAFTS, 3)),  # per group: now, at the start of the step, predicted mid step
+        ("alpha", FLOAT, (SHAFTS, 3)),  # per group: this step, the step before, noise torque / inertia
+        ("bristle", FLOAT, (SHAFTS, 8)),
+        ("memory", FLOAT, (SHAFTS,)),  # bristle rate or GMS level of the step
+        ("force", FLOAT, (SHAFTS, 7)),  # applied, its slope, passed on, friction A, B, torque T, work space
+        ("joint_torque", FLOAT, (JOINTS,)),
+        ("motor", FLOAT, (MOTORS, 8)),  # current, torque, voltage at start and end, mean voltage, inductive current
+        ("signal_at", INT, (INPUTS,)),
+        ("signal_now", FLOAT, (INPUTS, 2)),  # start and end of the step
+        ("command", FLOAT, (CONTROLLERS,)),
+        ("loop", FLOAT, (CONTROLLERS, 3)),  # integral, previous readings
+        ("counter", INT, (CONTROLLERS, 2)),  # next tick, next command to apply
+        ("sensor_at", INT, (SENSORS, 2)),  # next sample, last one seen by a controller
+    ],
+    align=True,
+)
