@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from friction_ocp.drive.control import ControlSignals, apply_tick, compute_tick
+from friction_ocp.drive.control import apply_tick, compute_tick
 from friction_ocp.drive.kick import Step, kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Channel, Drive
@@ -24,7 +24,7 @@ class SteppedDrive:
     `step(x, u, p, h, width) -> x` advances by `h` s under midpoint inputs `u`;
     `output(x, u, p, h, width) -> y` predicts the recorded output channels;
     `tick(x, u, p, kind) -> x` lets a sampled controller compute (kind 1) or apply (kind 2);
-    `start(q, v, u, p) -> x` makes a state from the angles and speeds of the groups.
+    `start(y, dy, u, p) -> x` makes a state from smoothed output channels and their time derivatives.
     """
 
     mechanism: Mechanism
@@ -173,21 +173,59 @@ def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
     return ca.vertcat(state.angles, state.speeds, state.bristle, state.extra, column(chosen))
 
 
-def _start(mech: Mechanism, q: ca.SX, v: ca.SX) -> ca.SX:
-    """Return the state at given angles and speeds: bristles fully deflected by motion, controller at rest."""
+def _start(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
+    """Return the state that measured motion suggests: no twist, bristles as deflected by steady motion."""
+    q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    memory = [_first_memory(mech.seen(at), name) for name in mech.memory_names]
+    deflections = [shaft.friction.steady_deflection(mech.shaft_speed(shaft.name, v)) for shaft in mech.bristles]
+    memory = [_first_memory(mech, at, name) for name in mech.memory_names]
     return ca.vertcat(
-        _pick(q, mech.angle_groups),
-        _pick(v, mech.free_groups),
-        ca.SX.zeros(len(mech.bristles)),
-        ca.SX.zeros(len(mech.extra_names)),
-        column(memory),
+        _pick(q, mech.angle_groups), _pick(v, mech.free_groups), column(deflections), at.extra, column(memory)
     )
 
 
-def _first_memory(seen: ControlSignals, name: str) -> Any:
-    return seen.theta if name.startswith("controller.previous") else 0.0
+def _first_memory(mech: Mechanism, at: Motion, name: str) -> Any:
+    if not name.startswith("controller.previous"):
+        return 0.0
+    controller, seen = mech.drive.controller, mech.seen(at)
+    assert controller is not None and controller.sample_time is not None
+    return seen.theta - (1.0 if name.endswith("1") else 2.0) * controller.sample_time * seen.omega
+
+
+def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return group angles and speeds from the channels that see them, else through the transmissions."""
+    q, v = dict[int, Any](), dict[int, Any]()
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part)
+        if group is None or channel.signal == "alpha":
+            continue
+        ratio = mech.topology.speed_ratio[channel.part] * channel.gain
+        if channel.signal == "theta":
+            q.setdefault(group, (y[k] - channel.offset) / ratio)
+            v[group] = dy[k] / ratio
+        else:
+            v.setdefault(group, (y[k] - channel.offset) / ratio)
+    for group in mech.prescribed:
+        v[group] = _prescribed(mech, group, "omega")
+        if mech.prescribed[group] == "theta":
+            q[group] = _prescribed(mech, group, "theta")
+    for known in (q, v):
+        _spread(mech, known)
+    groups = range(len(mech.topology.roots))
+    return column([q.get(g, 0.0) for g in groups]), column([v.get(g, 0.0) for g in groups])
+
+
+def _spread(mech: Mechanism, known: dict[int, Any]) -> None:
+    """Carry angles or speeds over elastic transmissions to groups that no channel sees."""
+    ratio, group_of = mech.topology.speed_ratio, mech.topology.group_of
+    for _ in mech.topology.elastic:
+        for item in mech.topology.elastic:
+            a, b = group_of[item.from_shaft], group_of[item.to_shaft]
+            whole = item.ratio * ratio[item.to_shaft] / ratio[item.from_shaft]
+            if a in known and b not in known:
+                known[b] = known[a] / whole
+            elif b in known and a not in known:
+                known[a] = known[b] * whole
 
 
 def stepped(drive: Drive) -> SteppedDrive:
@@ -197,7 +235,7 @@ def stepped(drive: Drive) -> SteppedDrive:
     groups = len(mech.topology.roots)
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")  # pyright: ignore[reportArgumentType]
-    q, v = (ca.SX.sym(name, groups) for name in ("q", "v"))  # pyright: ignore[reportArgumentType]
+    y, dy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy"))  # pyright: ignore[reportArgumentType]
     advance = _advance(mech, state, h, width)
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
     return SteppedDrive(
@@ -209,5 +247,5 @@ def stepped(drive: Drive) -> SteppedDrive:
         step=ca.Function("step", [state.x, u, p, h, width], [advance]),
         output=ca.Function("output", [state.x, u, p, h, width], [_outputs(mech, state, h, width)]),
         tick=tick,
-        start=ca.Function("start", [q, v, u, p], [_start(mech, q, v)]),
+        start=ca.Function("start", [y, dy, u, p], [_start(mech, y, dy)]),
     )

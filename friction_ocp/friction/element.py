@@ -108,6 +108,13 @@ class FrictionElement:
         sides = [self.load.along(side).viscous for side in ("positive", "negative")]
         return viscous + transmitted * where(omega >= 0, sides[0], sides[1])
 
+    def steady_deflection(self, omega: Any) -> Any:
+        """Return the deflection of a bristle in steady motion, rounded at standstill."""
+        (_, positive), (_, negative) = self._bristles()
+        level = where(omega >= 0, positive.level(smooth_abs(omega)), negative.level(smooth_abs(omega)))
+        omega_s = getattr(positive, "omega_s", 1.0)
+        return smooth_sign(omega, 0.1 * omega_s) * level / self._sigma(0, omega)
+
     def step_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
         """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""
         if isinstance(self.law, NoFriction):

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import interpolate, linalg
+import scipy.interpolate as _interpolate  # pyright: ignore[reportMissingTypeStubs]
+import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.recording import FloatArray
 
-CubicSpline: Any = interpolate.CubicSpline
-solveh_banded: Any = linalg.solveh_banded
+interpolate: Any = _interpolate  # its own types are incomplete
+linalg: Any = _linalg
 
 _MAD_TO_STD = 1.4826
 _MIN_LEVELS = 5
@@ -68,8 +70,9 @@ def detect_resolution(values: npt.ArrayLike) -> float | None:
 def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     """Tell whether the signal runs into its highest or lowest value and stays there, while it moves otherwise.
 
-    Only runs of equal extremes count that are longer than runs elsewhere and are reached or left in full motion: neither
-    a rest nor the flat top of a quantised sine is. A commanded plateau looks the same as clipping.
+    Only runs of equal extremes count that are longer than runs elsewhere and are reached or left in full motion, four
+    levels of a quantised signal within five samples: neither a rest nor the flat top of a quantised sine is. But a
+    commanded plateau looks the same as clipping.
     """
     y = np.asarray(values, dtype=np.float64)
     y = y[np.isfinite(y)]
@@ -91,20 +94,21 @@ def smooth_motion(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return position, speed and acceleration, (n,) each, of a cubic smoothing spline.
 
-    It shifts no phase; its gain is 1/2 at the cutoff and falls with the fourth power of frequency above it. Without a cutoff the spline is as smooth as the noise floor allows: it leaves a residual of `high_frequency_noise`.
-    Missing samples are bridged; the acceleration is zero at both ends. Source: Reinsch 1967.
+    It shifts no phase; its gain is 1/2 at the cutoff and falls with the fourth power of frequency above it. Without a
+    cutoff it is as smooth as the noise floor allows: the residual has the size of `high_frequency_noise`. Missing
+    samples are bridged; the acceleration is zero at both ends. Source: Reinsch 1967.
     """
     t = np.asarray(time, dtype=np.float64)
     t_present, y = _present(time, values)
     if len(t_present) < 5:
-        raise ValueError(f"{len(t_present)} samples are too few for a smooth motion; 5 are needed")
+        raise FrictionOcpError(Finding("smooth motion", f"there are {len(t_present)} samples", "at least 5 are needed"))
     step = float(np.mean(np.diff(t_present)))
     if cutoff_hz is None:
         penalty = _penalty_for_noise(t_present / step, y, high_frequency_noise(t_present, y))
     else:
         penalty = (2.0 * np.pi * cutoff_hz * step) ** -4
     smooth = y if penalty == 0.0 else _reinsch(t_present / step, y, penalty)
-    spline = CubicSpline(t_present, smooth, bc_type="natural")
+    spline = interpolate.CubicSpline(t_present, smooth, bc_type="natural")
     theta, omega, alpha = (np.asarray(spline(t, order), dtype=np.float64) for order in range(3))
     return theta, omega, alpha
 
@@ -121,7 +125,8 @@ def _fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
     distance = times[:, :, None] - times[:, None, :]
     weights = 1.0 / np.prod(distance + np.eye(5), axis=2)
     weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-    return np.sum(weights * np.lib.stride_tricks.sliding_window_view(y, 5), axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(y, 5)
+    return np.sum(weights * (windows - windows[:, 2:3]), axis=1)
 
 
 def _common_divisor(gaps: FloatArray, rounding: float) -> float | None:
@@ -148,7 +153,7 @@ def _runs(y: FloatArray) -> list[tuple[int, int]]:
 def _is_abrupt(y: FloatArray, at_extreme: npt.NDArray[np.bool_], start: int, stop: int, resolution: float) -> bool:
     """Tell whether the signal enters or leaves the run as fast as it moves elsewhere.
 
-    A parabola entered and left with slope s is s n / 4 high over n samples; a quantised one stays within a level or two.
+    A parabola entered and left with slope s is s n / 4 high over n samples; a quantised one stays within few levels.
     """
 
     def moves(reach: int) -> list[float]:
@@ -171,7 +176,7 @@ def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
     bands[2] = (h[:-1] + h[1:]) / 3.0 + penalty * (lower**2 + middle**2 + upper**2)
     bands[1, 1:] = h[1:-1] / 6.0 + penalty * (middle[:-1] * lower[1:] + upper[:-1] * middle[1:])
     bands[0, 2:] = penalty * upper[:-2] * lower[2:]
-    curvature = np.asarray(solveh_banded(bands, np.diff(np.diff(y) / h)), dtype=np.float64)
+    curvature = np.asarray(linalg.solveh_banded(bands, np.diff(np.diff(y) / h)), dtype=np.float64)
     padded = np.concatenate(([0.0], curvature, [0.0]))
     slope = np.concatenate(([0.0], np.diff(padded) / h, [0.0]))
     return y - penalty * np.diff(slope)

@@ -63,6 +63,7 @@ def write_recording(recording: Recording, path: str | Path) -> None:
     _raise(check_recording(recording, where) + check_written_names(recording, where))
     with _writing(Path(path), RECORDING_FORMAT) as file:
         _write_provenance(file, recording)
+        file.create_group("channels", track_order=True)
         for name, channel in recording.channels.items():
             attributes = {"unit": channel.unit}
             clock_path = "/time" if channel.clock == "time" else f"/clocks/{channel.clock}"

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from friction_ocp.drive.stepping import SteppedDrive
@@ -35,6 +36,8 @@ class Sweep:
     def __init__(self, drive: SteppedDrive, active: Sequence[int]) -> None:
         self.drive = drive
         self.active = tuple(active)
+        self.start = _start_with_slope(drive, self.active)
+        """(y, dy, u, p) -> start state and its derivative by the active numbers."""
         library = compile_sweep(drive, self.active)
         if library is None:
             raise RuntimeError("no compiler")
@@ -84,3 +87,10 @@ class Sweep:
 
 def _pointer(array: FloatArray | IntArray | None) -> ctypes.c_void_p:
     return ctypes.c_void_p(None if array is None else array.ctypes.data)
+
+
+def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:
+    arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(4)]  # pyright: ignore[reportArgumentType]
+    value = drive.start.call(arguments, True, False)[0]
+    chosen = ca.vertcat(*[arguments[3][k] for k in active]) if active else ca.SX(0, 1)
+    return ca.Function("start", arguments, [ca.densify(value), ca.densify(ca.jacobian(value, chosen))])

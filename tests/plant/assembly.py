@@ -241,6 +241,8 @@ def motor_rows(
             loop, source = controllers.index(motor.controller), -1
         elif source < 0:
             raise ValueError(f"{motor.name}: no input '{motor.name}.{motor.drive}' and no controller")
+        if motor.drive == "voltage" and motor.resistance <= 0:
+            raise ValueError(f"{motor.name}: a voltage-driven motor needs resistance > 0, not {motor.resistance} ohm")
         enable = columns.get(f"{motor.name}.enable", -1)
         rows.append((_index(shafts, motor.shaft), DRIVES[motor.drive], source, loop, enable))
         winding.append((motor.torque_constant, motor.resistance, motor.inductance, motor.share, motor.bias))

@@ -41,7 +41,7 @@ MODEL = np.dtype(
             "traits",
             INT,
             (SHAFTS, 3),
-        ),  # per group: set-valued, implicit in the joint torque, prescribed-speed input or -1
+        ),  # set-valued, implicit in the joint torque, input of the prescribed speed or -1
         ("law", INT, (SHAFTS,)),
         ("friction", FLOAT, (SHAFTS, 2, COLUMNS)),  # by direction
         ("applied", FLOAT, (SHAFTS, 3)),  # gravity torque, gravity phase, constant torque

@@ -38,6 +38,24 @@ def level(q, speed, load):
 
 
 @njit
+def bristle_line(m, st, i, omega, d, top, slope, h):
+    """Return A, B of LuGre or Dahl: the bristle over a step of constant speed, its rate frozen at `omega`."""
+    z = st.bristle[i, 0]
+    lead = z if z != 0.0 else omega if omega != 0.0 else d
+    side = m.friction[i, 0 if lead > 0.0 else 1]
+    rate = side[SIGMA0] * abs(omega) / top
+    st.memory[i] = rate
+    x = rate * h
+    if x < 1e-4:
+        phi, psi = 1.0 - 0.5 * x, 0.5 - x / 6.0
+    else:
+        phi = -math.expm1(-x) / x
+        psi = (1.0 - phi) / x
+    a = (side[SIGMA0] - side[SIGMA1] * rate) * phi * z
+    return a, side[SIGMA0] * h * psi + side[SIGMA1] * phi + slope
+
+
+@njit
 def friction_line(m, st, i, omega, d, load, h):
     """Return A, B of the mean friction torque A + B omega_mid of a step; d is the direction at standstill."""
     q = m.friction[i, 0 if (omega > 0.0 or (omega == 0.0 and d > 0.0)) else 1]
@@ -45,18 +63,7 @@ def friction_line(m, st, i, omega, d, load, h):
     slope = q[VISCOUS] + q[LOAD_V] * load
     top = level(q, speed, load)
     if m.law[i] == BRISTLE:
-        z = st.bristle[i, 0]
-        side = m.friction[i, 0 if (z > 0.0 or (z == 0.0 and (omega > 0.0 or (omega == 0.0 and d > 0.0)))) else 1]
-        rate = side[SIGMA0] * speed / top
-        st.memory[i] = rate
-        x = rate * h
-        if x < 1e-4:
-            phi, psi = 1.0 - 0.5 * x, 0.5 - x / 6.0
-        else:
-            phi = -math.expm1(-x) / x
-            psi = (1.0 - phi) / x
-        a = (side[SIGMA0] - side[SIGMA1] * rate) * phi * z
-        return a, side[SIGMA0] * h * psi + side[SIGMA1] * phi + slope
+        return bristle_line(m, st, i, omega, d, top, slope, h)
     if m.law[i] == GMS:
         a = 0.0
         st.memory[i] = top

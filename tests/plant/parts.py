@@ -125,7 +125,7 @@ class PlantSensor:
     `measures` is `<shaft>.theta|omega|alpha`, `<motor>.current|torque|voltage`, or the name of any input, such as
     `reference.theta` or `motor.enable`. alpha is the acceleration without the white torque noise, whose own variance is
     infinite. `jitter` moves the sampling instants, `stamp_error` falsifies the recorded times (both standard
-    deviations, clipped at 0.4 periods); `dropout` is the probability of a NaN.
+    deviations, clipped at 0.4 periods, the latter at 0.05 where both act); `dropout` is the probability of a NaN.
     """
 
     name: str

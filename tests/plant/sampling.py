@@ -63,7 +63,8 @@ def draw_samples(
         )
 
     taken = np.clip(nominal + scatter(sensor.jitter, 0.4 * sensor.period), 0.0, duration)
-    stamps = taken + scatter(sensor.stamp_error, 0.4 * sensor.period * (sensor.jitter == 0) or 0.05 * sensor.period)
+    room = 0.05 if sensor.jitter > 0 else 0.4
+    stamps = taken + scatter(sensor.stamp_error, room * sensor.period)
     noise = scatter(sensor.noise_std, np.inf)
     lost = rng.uniform(size=nominal.size) < sensor.dropout if rng and sensor.dropout else np.zeros(nominal.size, bool)
     return Samples(sensor, _place(sensor, shafts, motors, inputs), taken, stamps, noise, lost)

@@ -1,0 +1,92 @@
+"""One recording made ready for estimation: its time grid, its samples at the nodes, its smoothed motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.drive.parts import Channel
+from friction_ocp.drive.stepping import SteppedDrive
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.problem import RecordingUse
+from friction_ocp.recording.conditioning import smooth_motion
+from friction_ocp.simulation.grid import FloatArray, Grid, InputSignal, build_grid
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What the estimator needs of one recording."""
+
+    name: str
+    grid: Grid
+    measured: FloatArray
+    """(n, outputs) samples at the nodes, NaN where there is none."""
+    smooth: FloatArray
+    """(n, outputs) smoothed samples."""
+    rate: FloatArray
+    """(n, outputs) time derivatives of the smoothed samples."""
+
+
+def known_delay(channel: Channel) -> float:
+    """Return a delay that is a plain number, to be undone exactly by shifting the clock; 0 for a fitted one."""
+    return float(channel.delay) if isinstance(channel.delay, (int, float)) else 0.0
+
+
+def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ...], max_step: float) -> Experiment:
+    """Lay the grid of a recording and put its samples on it.
+
+    Raises FrictionOcpError where the recording lacks a channel.
+    """
+    recording = use.recording
+    outputs = drive.mechanism.drive.outputs
+    missing = [channel.name for channel in (*inputs, *outputs) if channel.name not in recording.channels]
+    if missing:
+        there = ", ".join(recording.channels)
+        raise FrictionOcpError(
+            [Finding(recording.name, f"the recording has no channel '{name}'", f"it has {there}") for name in missing]
+        )
+    signals = [_input_signal(use, channel) for channel in inputs]
+    samples = np.unique(np.concatenate([recording.channels[channel.name].time for channel in outputs]))
+    grid = build_grid(samples, _with_slopes(signals, inputs, drive), drive.mechanism.drive.controller, max_step)
+    columns = [_on_nodes(grid, use, channel.name) for channel in outputs]
+    motions = [_smooth(grid, use, channel.name) for channel in outputs]
+    return Experiment(
+        name=use.name,
+        grid=grid,
+        measured=np.column_stack(columns),
+        smooth=np.column_stack([value for value, _ in motions]),
+        rate=np.column_stack([rate for _, rate in motions]),
+    )
+
+
+def _input_signal(use: RecordingUse, channel: Channel) -> InputSignal:
+    recorded = use.recording.channels[channel.name]
+    return InputSignal(recorded.time - known_delay(channel), recorded.values, channel.hold == "zero")
+
+
+def _with_slopes(signals: list[InputSignal], inputs: tuple[Channel, ...], drive: SteppedDrive) -> list[InputSignal]:
+    """Add the slope of every input that prescribes an angle, in the order of the model's inputs."""
+    by_name = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
+    laid: list[InputSignal] = []
+    for name in drive.input_names:
+        if name.endswith("'"):
+            value, rate, _ = smooth_motion(by_name[name[:-1]].time, by_name[name[:-1]].values)
+            laid.append(InputSignal(by_name[name[:-1]].time, rate + 0.0 * value, False))
+        else:
+            laid.append(by_name[name])
+    return laid
+
+
+def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:
+    channel = use.recording.channels[name]
+    column = np.full(grid.time.size, np.nan)
+    at = np.clip(np.searchsorted(grid.time, channel.time - 1e-9), 0, grid.time.size - 1)
+    column[at] = channel.values
+    return column
+
+
+def _smooth(grid: Grid, use: RecordingUse, name: str) -> tuple[FloatArray, FloatArray]:
+    channel = use.recording.channels[name]
+    value, rate, _ = smooth_motion(channel.time, channel.values)
+    return np.interp(grid.time, channel.time, value), np.interp(grid.time, channel.time, rate)

@@ -1,0 +1,91 @@
+"""Losses of a residual in units of its noise floor: the cost of an error and the weight it gets."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.simulation.grid import FloatArray
+
+
+class AbstractLoss(ABC):
+    """Cost rho(r) of a residual, and rho'(r) / r, its weight in an iteratively reweighted step."""
+
+    @abstractmethod
+    def cost(self, residual: FloatArray) -> FloatArray:
+        """Return rho elementwise."""
+
+    @abstractmethod
+    def weight(self, residual: FloatArray) -> FloatArray:
+        """Return rho'(r) / r elementwise."""
+
+    @abstractmethod
+    def curvature(self, residual: FloatArray) -> FloatArray:
+        """Return rho''(r) elementwise."""
+
+
+@dataclass(frozen=True)
+class Squares(AbstractLoss):
+    """Half the square: the likelihood of normal noise."""
+
+    def cost(self, residual: FloatArray) -> FloatArray:
+        return 0.5 * residual**2
+
+    def weight(self, residual: FloatArray) -> FloatArray:
+        return np.ones_like(residual)
+
+    def curvature(self, residual: FloatArray) -> FloatArray:
+        return np.ones_like(residual)
+
+
+@dataclass(frozen=True)
+class Absolute(AbstractLoss):
+    """|r| / size, rounded below `rounding`: the likelihood of Laplace noise of mean size `size`."""
+
+    size: float
+    rounding: float
+
+    def cost(self, residual: FloatArray) -> FloatArray:
+        return (np.sqrt(residual**2 + self.rounding**2) - self.rounding) / self.size
+
+    def weight(self, residual: FloatArray) -> FloatArray:
+        return 1.0 / (np.sqrt(residual**2 + self.rounding**2) * self.size)
+
+    def curvature(self, residual: FloatArray) -> FloatArray:
+        return self.rounding**2 / ((residual**2 + self.rounding**2) ** 1.5 * self.size)
+
+
+@dataclass(frozen=True)
+class Huber(AbstractLoss):
+    """Square near zero, linear beyond `knee` noise floors. Source: Huber 1964."""
+
+    knee: float = 1.345
+
+    def cost(self, residual: FloatArray) -> FloatArray:
+        size = np.abs(residual)
+        return np.where(size <= self.knee, 0.5 * size**2, self.knee * (size - 0.5 * self.knee))
+
+    def weight(self, residual: FloatArray) -> FloatArray:
+        return np.minimum(1.0, self.knee / np.maximum(np.abs(residual), 1e-300))
+
+    def curvature(self, residual: FloatArray) -> FloatArray:
+        return (np.abs(residual) <= self.knee).astype(float)
+
+
+@dataclass(frozen=True)
+class StudentT(AbstractLoss):
+    """Negative log-likelihood of Student's t noise. Source: Lange, Little, Taylor 1989."""
+
+    freedom: float = 4.0
+
+    def cost(self, residual: FloatArray) -> FloatArray:
+        return 0.5 * (self.freedom + 1.0) * np.log1p(residual**2 / self.freedom)
+
+    def weight(self, residual: FloatArray) -> FloatArray:
+        return (self.freedom + 1.0) / (self.freedom + residual**2)
+
+    def curvature(self, residual: FloatArray) -> FloatArray:
+        squared = residual**2
+        return (self.freedom + 1.0) * (self.freedom - squared) / (self.freedom + squared) ** 2

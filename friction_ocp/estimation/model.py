@@ -1,0 +1,122 @@
+"""A problem made ready to compute: model functions, time grids, noise floors, scales."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.experiment import Experiment, experiment
+from friction_ocp.estimation.noise import NoiseFloor, noise_floor
+from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
+from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.sweep import Sweep
+
+STEP_PER_RADIAN = 0.1
+"""Integrator step over the inverse of the fastest oscillation: frequencies are then right to 0.04 %."""
+STEP_PER_DECAY = 0.5
+"""Integrator step over the shortest decay time."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that a fit or a simulation of a problem needs."""
+
+    problem: Problem
+    drive: SteppedDrive
+    space: ParameterSpace
+    sweep: Sweep
+    train: tuple[Experiment, ...]
+    validation: tuple[Experiment, ...]
+    floors: Mapping[str, NoiseFloor]
+    speed_scale: FloatArray
+    """(groups + 1,) typical speed of each group and 1 for the backlash corners, to scale the smoothing."""
+    state_scale: FloatArray
+    """(states,) typical size of each state."""
+
+    @property
+    def noise(self) -> FloatArray:
+        """(outputs,) noise floors."""
+        return np.array([self.floors[name].std for name in self.drive.output_names])
+
+
+def prepare(problem: Problem) -> Model:
+    """Build model functions, grids and scales; raises FrictionOcpError where recordings do not fit the drive."""
+    drive = stepped(problem.drive)
+    space = parameter_space(problem, drive.parameter_names)
+    sweep = Sweep(drive, space.active)
+    max_step = problem.estimation.max_step or integrator_step(drive, space, problem)
+    uses = [_try_experiment(use, drive, problem, max_step) for use in problem.recordings]
+    findings = [finding for use in uses if isinstance(use, FrictionOcpError) for finding in use.findings]
+    if findings:
+        raise FrictionOcpError(findings)
+    experiments = [use for use in uses if isinstance(use, Experiment)]
+    train = tuple(experiments[: len(problem.train)])
+    floors = {channel.name: noise_floor(channel, _signals(problem, channel.name)) for channel in problem.drive.outputs}
+    states = np.concatenate([_suggested(sweep, space, item) for item in train])
+    return Model(
+        problem=problem,
+        drive=drive,
+        space=space,
+        sweep=sweep,
+        train=train,
+        validation=tuple(experiments[len(problem.train) :]),
+        floors=floors,
+        speed_scale=_speed_scale(drive, states),
+        state_scale=_state_scale(states),
+    )
+
+
+def _try_experiment(
+    use: RecordingUse, drive: SteppedDrive, problem: Problem, max_step: float
+) -> Experiment | FrictionOcpError:
+    try:
+        return experiment(use, drive, problem.drive.inputs, max_step)
+    except FrictionOcpError as error:
+        return error
+
+
+def _signals(problem: Problem, name: str) -> list[tuple[FloatArray, FloatArray]]:
+    channels = [use.recording.channels[name] for use in problem.recordings]
+    return [(channel.time, channel.values) for channel in channels]
+
+
+def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment) -> FloatArray:
+    numbers = space.numbers(space.guess, item.name)
+    value, _ = sweep.start.map(item.grid.time.size)(item.smooth.T, item.rate.T, item.grid.at_node.T, numbers)
+    return np.asarray(value).T
+
+
+def _state_scale(states: FloatArray) -> FloatArray:
+    spread = np.std(states, axis=0)
+    return np.where(spread > 0, spread, 1.0)
+
+
+def _speed_scale(drive: SteppedDrive, states: FloatArray) -> FloatArray:
+    mech = drive.mechanism
+    first = len(mech.angle_groups)
+    scale = np.ones(len(mech.topology.roots) + 1)
+    for k, group in enumerate(mech.free_groups):
+        speed = float(np.sqrt(np.mean(states[:, first + k] ** 2)))
+        scale[group] = speed if speed > 0 else 1.0
+    return scale
+
+
+def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
+    """Return the longest step, s, that resolves the fastest mode of the drive at the guesses, at standstill."""
+    tiny = 1e-7
+    x = ca.SX.sym("x", len(drive.state_names))  # pyright: ignore[reportArgumentType]
+    u = np.zeros(len(drive.input_names))
+    width = np.full(len(drive.mechanism.topology.roots) + 1, 1e6)
+    numbers = space.numbers(space.guess, problem.train[0].name)
+    after = drive.step(x, u, numbers, tiny, width)
+    slope = ca.Function("slope", [x], [ca.jacobian(after, x)])
+    rates = np.linalg.eigvals((np.asarray(slope(np.zeros(x.numel()))) - np.eye(x.numel())) / tiny)
+    fastest = float(np.max(np.abs(rates.imag), initial=0.0))
+    decay = float(np.max(np.abs(rates.real), initial=0.0))
+    return min(STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6), 10.0)

@@ -1,0 +1,138 @@
+"""The fitted parameters as one vector, and the numbers of the drive as functions of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.expressions import parse, resolve_ties
+from friction_ocp.parameters import Free, Tie
+from friction_ocp.simulation.grid import FloatArray
+
+
+@dataclass(frozen=True)
+class ParameterSpace:
+    """Names, starts, bounds and priors of the fitted parameters; all arrays have one entry a parameter."""
+
+    names: tuple[str, ...]
+    """Paths; `path@recording` where a recording has its own value."""
+    guess: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    prior_mean: FloatArray
+    prior_std: FloatArray
+    """Infinite where there is no prior."""
+    leaf_names: tuple[str, ...]
+    """Every number of the drive, in the order of the model functions' `p`."""
+    active: tuple[int, ...]
+    """Indices into `leaf_names` of the numbers that depend on fitted parameters."""
+    maps: Mapping[str, ca.Function]
+    """By recording: parameters -> (numbers of the drive, derivative of the active ones)."""
+    constraints: ca.Function | None
+    """Parameters -> (values, Jacobian) of expressions that must be >= 0."""
+    constraint_texts: tuple[str, ...] = ()
+
+    @property
+    def scale(self) -> FloatArray:
+        """Typical size of each parameter, for scaling."""
+        span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, 1.0)
+        size = np.where(self.guess != 0, np.abs(self.guess), 0.05 * span)
+        return np.where(np.isfinite(self.prior_std), np.minimum(size, 10 * self.prior_std), size)
+
+    def numbers(self, theta: FloatArray, recording: str) -> FloatArray:
+        """Return all numbers of the drive for a recording."""
+        return np.asarray(self.maps[recording](theta)[0]).ravel()
+
+    def numbers_and_slope(self, theta: FloatArray, recording: str) -> tuple[FloatArray, FloatArray]:
+        """Return all numbers and (active, parameters) the derivative of the active ones."""
+        numbers, slope = self.maps[recording](theta)
+        return np.asarray(numbers).ravel(), np.asarray(slope)
+
+    def clip(self, theta: FloatArray) -> FloatArray:
+        """Return the nearest point inside the bounds."""
+        return np.clip(theta, self.lower, self.upper)
+
+    def moved(self, start: FloatArray) -> ParameterSpace:
+        """Return the space with another start; priors and bounds stay."""
+        return replace(self, guess=start)
+
+
+def parameter_space(problem: Problem, leaf_names: Sequence[str]) -> ParameterSpace:
+    """Collect the fitted parameters of a problem; `leaf_names` is the order of the model's numbers."""
+    values = {leaf.path: leaf.value for leaf in drive_leaves(problem.drive)}
+    free = {path: value for path, value in values.items() if isinstance(value, Free)}
+    entries: list[tuple[str, Free]] = []
+    for path, value in free.items():
+        owners = [use.name for use in problem.train if path not in use.set] if value.scope == "recording" else [""]
+        entries += [(f"{path}@{owner}" if owner else path, value) for owner in owners]
+    if not entries:
+        raise FrictionOcpError(
+            Finding(str(problem.path or problem.title), "nothing to fit", "a parameter with {guess: ...} is fitted")
+        )
+    names = tuple(name for name, _ in entries)
+    theta = ca.SX.sym("theta", len(names))  # pyright: ignore[reportArgumentType]
+    symbols = {name: theta[k] for k, name in enumerate(names)}
+    tables = {use.name: _table(problem.drive, values, symbols, use) for use in problem.recordings}
+    leaf_vectors = {name: ca.vertcat(*[ca.SX(table[leaf]) for leaf in leaf_names]) for name, table in tables.items()}
+    active = _active(leaf_vectors, theta)
+    maps = {
+        name: ca.Function(
+            "numbers", [theta], [vector, ca.densify(ca.jacobian(ca.vertcat(*[vector[k] for k in active]), theta))]
+        )
+        for name, vector in leaf_vectors.items()
+    }
+    fields = {
+        "guess": [value.guess for _, value in entries],
+        "lower": [value.min for _, value in entries],
+        "upper": [value.max for _, value in entries],
+        "prior_mean": [value.centre for _, value in entries],
+        "prior_std": [np.inf if value.prior_std is None else value.prior_std for _, value in entries],
+    }
+    return ParameterSpace(
+        names=names,
+        leaf_names=tuple(leaf_names),
+        active=active,
+        maps=maps,
+        constraints=_constraints(problem, tables[problem.train[0].name], theta),
+        constraint_texts=problem.constraints,
+        **{key: np.asarray(column, dtype=float) for key, column in fields.items()},
+    )
+
+
+def _table(drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse) -> dict[str, object]:
+    """Return every number of the drive in one recording: fixed, fitted or tied."""
+    table: dict[str, object] = {}
+    ties: dict[str, str] = {}
+    for path, value in values.items():
+        if path in use.set:
+            table[path] = use.set[path]
+        elif isinstance(value, Free):
+            table[path] = symbols.get(path, symbols.get(f"{path}@{use.name}", value.guess))
+        elif isinstance(value, Tie):
+            ties[path] = value.expr
+        else:
+            table[path] = value
+    return resolve_ties(ties, table)
+
+
+def _active(vectors: Mapping[str, ca.SX], theta: ca.SX) -> tuple[int, ...]:
+    moving: set[int] = set()
+    for vector in vectors.values():
+        rows, _ = ca.jacobian_sparsity(vector, theta).get_triplet()
+        moving.update(rows)
+    return tuple(sorted(moving))
+
+
+def _constraints(problem: Problem, table: Mapping[str, object], theta: ca.SX) -> ca.Function | None:
+    if not problem.constraints:
+        return None
+    margins = [parse(text, tuple(table), f"constraints[{k}]").evaluate(table) for k, text in enumerate(problem.constraints)]
+    stacked = ca.vertcat(*[ca.SX(margin) for margin in margins])
+    return ca.Function("constraints", [theta], [stacked, ca.densify(ca.jacobian(stacked, theta))])

@@ -1,0 +1,277 @@
+"""The relaxed multiple-shooting program: residuals and Gauss-Newton blocks of all recordings.
+
+Variables are the fitted parameters and the state at the start of every segment. Residuals are measurement
+errors over their noise floors, continuity gaps over their process noise, and priors. With one segment a
+recording the gaps vanish and the program is the free run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friction_ocp.drive.stepping import SteppedDrive
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.losses import AbstractLoss, Squares
+from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.sweep import Sweep, SweepResult
+
+
+@dataclass(frozen=True)
+class Segments:
+    """How one recording is cut."""
+
+    first: IntArray
+    """(segments + 1,) first node of each segment; last the last node of the recording."""
+    gap_weight: FloatArray | None
+    """(segments - 1, states, states) W with W'W the inverse covariance of each continuity gap; None leaves
+    the segments unconnected (windows)."""
+    measured: int = 0
+    """How many nodes, from the first, are no variables but what the smoothed measurement says."""
+    start_weight: FloatArray | None = None
+    """(states,) 1 / standard deviation of the prior on the first node, where that is a variable."""
+
+    @property
+    def count(self) -> int:
+        """Number of segments."""
+        return len(self.first) - 1
+
+
+@dataclass(frozen=True)
+class Point:
+    """Values of all variables."""
+
+    theta: FloatArray
+    """(parameters,)."""
+    nodes: tuple[FloatArray, ...]
+    """By recording (segments, states)."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Gauss-Newton system of one recording: gradient and block-tridiagonal Hessian with a parameter border."""
+
+    node_node: FloatArray
+    """(segments, states, states)."""
+    node_next: FloatArray
+    """(segments - 1, states, states): rows of segment j, columns of segment j + 1."""
+    node_theta: FloatArray
+    """(segments, states, parameters)."""
+    node_gradient: FloatArray
+    """(segments, states)."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Objective, gradient and Gauss-Newton Hessian at a point."""
+
+    objective: float
+    theta_theta: FloatArray
+    theta_gradient: FloatArray
+    blocks: tuple[Blocks, ...]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A least-squares program over parameters and node states."""
+
+    space: ParameterSpace
+    drive: SteppedDrive
+    sweep: Sweep
+    experiments: tuple[Experiment, ...]
+    segments: tuple[Segments, ...]
+    noise: FloatArray
+    """(outputs,) noise floors."""
+    width: FloatArray
+    """(groups + 1,) smoothing of the sign by group and of backlash corners; zeros are exact."""
+    loss: AbstractLoss = Squares()
+
+    def with_width(self, width: FloatArray) -> Program:
+        """Return the program with another smoothing."""
+        return replace(self, width=width)
+
+    def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
+        """Return node states from the smoothed measurement."""
+        pairs = zip(self.experiments, self.segments, strict=True)
+        return tuple(self._measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
+
+    def _measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""
+        numbers, slope = self.space.numbers_and_slope(theta, item.name)
+        many = self.sweep.start.map(len(nodes))
+        signals = (item.smooth, item.rate, item.grid.at_node)
+        value, by_active = many(*(signal[nodes].T for signal in signals), numbers)
+        states, active = self.sweep.start.size1_out(0), len(self.space.active)
+        by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
+        return np.asarray(value).T, by_active @ slope
+
+    def simulate(self, index: int, point: Point, derivatives: bool = False, with_states: bool = False) -> SweepResult:
+        """Simulate the segments of one recording from their nodes."""
+        item, cut = self.experiments[index], self.segments[index]
+        nodes = point.nodes[index]
+        if cut.measured:
+            nodes = nodes.copy()
+            nodes[: cut.measured] = self._measured_states(item, point.theta, cut.first[: cut.measured])[0]
+        numbers = self.space.numbers(point.theta, item.name)
+        return self.sweep.run(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
+
+    def residuals(self, index: int, y: FloatArray) -> FloatArray:
+        """Return (n, outputs) errors over the noise floor, NaN where there is no sample."""
+        return (y - self.experiments[index].measured) / self.noise
+
+    def objective(self, point: Point) -> float:
+        """Return the cost of a point; infinite where the simulation breaks down."""
+        total = _prior_cost(self.space, point.theta)
+        for index, (item, cut) in enumerate(zip(self.experiments, self.segments, strict=True)):
+            result = self.simulate(index, point)
+            errors = self.residuals(index, result.y)
+            cost = self.loss.cost(errors[np.isfinite(item.measured)])
+            total += float(np.sum(cost)) + self._gap_cost(cut, point.nodes[index], result.end)
+            total += self._start_cost(index, point)
+        return total if np.isfinite(total) else np.inf
+
+    def _gap_cost(self, cut: Segments, nodes: FloatArray, end: FloatArray) -> float:
+        if cut.gap_weight is None or cut.count < 2:
+            return 0.0
+        scaled = np.einsum("kij,kj->ki", cut.gap_weight, end[:-1] - nodes[1:])
+        return 0.5 * float(np.sum(scaled**2))
+
+    def _start_cost(self, index: int, point: Point) -> float:
+        weight = self.segments[index].start_weight
+        if weight is None:
+            return 0.0
+        suggested, _ = self._measured_states(self.experiments[index], point.theta, self.segments[index].first[:1])
+        return 0.5 * float(np.sum((weight * (point.nodes[index][0] - suggested[0])) ** 2))
+
+    def linearise(self, point: Point) -> Linearisation:
+        """Return objective, gradient and Gauss-Newton Hessian at a point."""
+        count = point.theta.size
+        hessian, gradient = np.zeros((count, count)), np.zeros(count)
+        total = _prior_cost(self.space, point.theta)
+        pull = np.where(np.isfinite(self.space.prior_std), self.space.prior_std, 1.0) ** -2.0
+        pull = np.where(np.isfinite(self.space.prior_std), pull, 0.0)
+        hessian += np.diag(pull)
+        gradient += pull * (point.theta - self.space.prior_mean)
+        blocks: list[Blocks] = []
+        for index in range(len(self.experiments)):
+            cost, by_theta, slope, block = self._linearise_recording(index, point)
+            total += cost
+            hessian += by_theta
+            gradient += slope
+            blocks.append(block)
+        return Linearisation(total if np.isfinite(total) else np.inf, hessian, gradient, tuple(blocks))
+
+    def _linearise_recording(self, index: int, point: Point) -> tuple[float, FloatArray, FloatArray, Blocks]:
+        cut, nodes = self.segments[index], point.nodes[index]
+        result = self.simulate(index, point, derivatives=True)
+        assert result.dy is not None and result.dend is not None
+        _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
+        states, count = nodes.shape[1], point.theta.size
+        system = _System.empty(cut.count, states, count)
+        self._add_measurements(index, result, slope, system)
+        self._add_gaps(cut, nodes, result, slope, system)
+        self._add_start(index, point, system)
+        blocks = Blocks(
+            system.node_node, system.node_next, system.node_theta, system.node_gradient
+        )
+        return system.cost, system.theta_theta, system.theta_gradient, blocks
+
+    def _add_measurements(self, index: int, result: SweepResult, slope: FloatArray, system: _System) -> None:
+        item, cut = self.experiments[index], self.segments[index]
+        assert result.dy is not None
+        errors = self.residuals(index, result.y)
+        seen = np.isfinite(item.measured)
+        errors = np.where(seen, errors, 0.0)
+        system.cost += float(np.sum(self.loss.cost(errors[seen])))
+        weight = np.where(seen, self.loss.weight(errors), 0.0)
+        states = system.node_node.shape[1]
+        for j in range(cut.count):
+            stop = cut.first[j + 1] + (1 if j == cut.count - 1 else 0)
+            rows = slice(cut.first[j], stop)
+            jacobian = (result.dy[rows] / self.noise[:, None]).reshape(-1, result.dy.shape[2])
+            by_node, by_theta = jacobian[:, :states], jacobian[:, states:] @ slope
+            system.add(j, by_node, by_theta, errors[rows].ravel(), weight[rows].ravel())
+
+    def _add_gaps(
+        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: _System
+    ) -> None:
+        if cut.gap_weight is None or cut.count < 2:
+            return
+        assert result.dend is not None
+        states = nodes.shape[1]
+        for j in range(cut.count - 1):
+            weight = cut.gap_weight[j]
+            gap = weight @ (result.end[j] - nodes[j + 1])
+            by_node, by_theta = weight @ result.dend[j][:, :states], weight @ (result.dend[j][:, states:] @ slope)
+            system.cost += 0.5 * float(gap @ gap)
+            system.add(j, by_node, by_theta, gap, np.ones(states))
+            system.node_next[j] -= by_node.T @ weight
+            system.node_node[j + 1] += weight.T @ weight
+            system.node_theta[j + 1] -= weight.T @ by_theta
+            system.node_gradient[j + 1] -= weight.T @ gap
+
+    def _add_start(self, index: int, point: Point, system: _System) -> None:
+        cut, item = self.segments[index], self.experiments[index]
+        if cut.measured:
+            _, slopes = self._measured_states(item, point.theta, cut.first[: cut.measured])
+            for j, slope in enumerate(slopes):
+                system.fold_node(j, slope)
+        elif cut.start_weight is not None:
+            suggested, slopes = self._measured_states(item, point.theta, cut.first[:1])
+            weight = np.diag(cut.start_weight)
+            error = cut.start_weight * (point.nodes[index][0] - suggested[0])
+            system.cost += 0.5 * float(error @ error)
+            system.add(0, weight, -weight @ slopes[0], error, np.ones(error.size))
+
+
+@dataclass
+class _System:
+    """Normal equations of one recording while they are summed."""
+
+    cost: float
+    node_node: FloatArray
+    node_next: FloatArray
+    node_theta: FloatArray
+    node_gradient: FloatArray
+    theta_theta: FloatArray
+    theta_gradient: FloatArray
+
+    @classmethod
+    def empty(cls, segments: int, states: int, count: int) -> _System:
+        return cls(
+            0.0,
+            np.zeros((segments, states, states)),
+            np.zeros((max(segments - 1, 0), states, states)),
+            np.zeros((segments, states, count)),
+            np.zeros((segments, states)),
+            np.zeros((count, count)),
+            np.zeros(count),
+        )
+
+    def add(
+        self, j: int, by_node: FloatArray, by_theta: FloatArray, error: FloatArray, weight: FloatArray
+    ) -> None:
+        """Add rows that depend on node j and the parameters."""
+        scaled_node, scaled_theta = by_node * weight[:, None], by_theta * weight[:, None]
+        self.node_node[j] += scaled_node.T @ by_node
+        self.node_theta[j] += scaled_node.T @ by_theta
+        self.theta_theta += scaled_theta.T @ by_theta
+        self.node_gradient[j] += scaled_node.T @ error
+        self.theta_gradient += scaled_theta.T @ error
+
+    def fold_node(self, j: int, slope: FloatArray) -> None:
+        """Make node j a function of the parameters with derivative `slope` (states, parameters)."""
+        cross = slope.T @ self.node_theta[j]
+        self.theta_theta += cross + cross.T + slope.T @ self.node_node[j] @ slope
+        self.theta_gradient += slope.T @ self.node_gradient[j]
+        if j < len(self.node_next):
+            self.node_theta[j + 1] += self.node_next[j].T @ slope
+            self.node_next[j] = 0.0
+        self.node_node[j], self.node_theta[j], self.node_gradient[j] = np.eye(slope.shape[0]), 0.0, 0.0
+
+
+def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:
+    return 0.5 * float(np.sum(((theta - space.prior_mean) / space.prior_std) ** 2))
+

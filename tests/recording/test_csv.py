@@ -1,0 +1,248 @@
+"""Import of delimited text by a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.recording.csv import inspect_csv, read_csv, sniff_layout
+from friction_ocp.recording.hdf5 import read_recording, write_recording
+from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
+from friction_ocp.recording.import_recording import import_recording
+
+MAP = """
+format: friction-ocp-map/1
+time: {column: timestamp, unit: ms}
+channels:
+  position: {column: pos, unit: deg}
+  current: {column: 2, unit: mA}
+title: Bench
+source: lab
+licence: CC0
+"""
+ROWS = [("timestamp", "pos", "cur"), ("0", "180", "100"), ("10", "", "200"), ("20", "90", "nan")]
+
+
+def put(path: Path, content: str) -> Path:
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+def faults(path: Path, content: str, import_map: str = MAP) -> str:
+    with pytest.raises(FrictionOcpError) as caught:
+        import_recording(put(path, content), put(path.with_suffix(".yaml"), import_map))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("suffix", "delimiter"), [("csv", ","), ("csv", ";"), ("tsv", "\t"), ("txt", ", ")])
+def test_columns_become_channels_in_si(tmp_path: Path, suffix: str, delimiter: str) -> None:
+    """Columns by header or index are read in SI units, empty cells as NaN, with their provenance."""
+    path = put(tmp_path / f"log.{suffix}", "\n".join(delimiter.join(row) for row in ROWS))
+    recording = import_recording(path, put(tmp_path / "map.yaml", MAP))
+    position, current = recording.channels["position"], recording.channels["current"]
+    np.testing.assert_allclose(position.time, [0.0, 0.01, 0.02])
+    np.testing.assert_allclose(position.values, [np.pi, np.nan, np.pi / 2])
+    np.testing.assert_allclose(current.values, [0.1, 0.2, np.nan])
+    assert (position.unit, current.unit) == ("rad", "A")
+    assert (recording.name, recording.title, recording.source, recording.licence) == ("log", "Bench", "lab", "CC0")
+    write_recording(recording, tmp_path / "log.h5")
+    assert read_recording(tmp_path / "log.h5").attributes["imported_from"] == f"log.{suffix}"
+
+
+PLAIN = ImportMap(Column("t", "s"), {"x": Column("x", "A")})
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "t,x\n0,1\n1,2\n",
+        '"t","x"\n0,1\n1,2\n',
+        "# t x\n0 1\n1 2\n",
+        "# bench of today\n#\n# t,x\n0,1\n# pause\n\n1,2\n",
+        "Logger 5, made 2024\nrate\t1000\nt\tx\ns\tA\n0\t1\n1\t2\n",
+        "  t     x\n  0.0   1e0\n  1.0   2.0\n",
+        "t;x;state\n0;1;on\n1;2;off\n",
+        "\ufefft,x\r\n0,1\r\n1,2\r\n",
+        "t , x\n0 , 1\n1 , 2",
+    ],
+)
+def test_layout_is_found(tmp_path: Path, content: str) -> None:
+    """Delimiter, header, comments, line of units and byte order mark are found without being told."""
+    channel = read_csv(put(tmp_path / "a.csv", content), PLAIN).channels["x"]
+    assert (channel.time.tolist(), channel.values.tolist()) == ([0.0, 1.0], [1.0, 2.0])
+
+
+@pytest.mark.parametrize(("encoding", "name"), [("utf-16", "x [°]"), ("cp1252", "x [°]")])
+def test_other_encodings_are_read(tmp_path: Path, encoding: str, name: str) -> None:
+    """Headers of spreadsheet programs are read in their encoding."""
+    (tmp_path / "a.csv").write_bytes(f"t,{name}\n0,1\n1,2\n".encode(encoding))
+    recording = read_csv(tmp_path / "a.csv", ImportMap(Column("t", "s"), {"x": Column(name, "°")}))
+    assert recording.channels["x"].unit == "rad"
+
+
+def test_decimal_comma_is_read_where_stated(tmp_path: Path) -> None:
+    """With decimal: ',' a comma is the decimal sign; without it the finding says so."""
+    content = "timestamp;pos;cur\n0,0;1,5;2\n0,5;2,5;3\n"
+    put(tmp_path / "a.csv", content)
+    recording = import_recording(tmp_path / "a.csv", put(tmp_path / "m.yaml", MAP + "decimal: ','\n"))
+    np.testing.assert_allclose(recording.channels["position"].values, np.deg2rad([1.5, 2.5]))
+    assert "line 2: '0,0' in column 'timestamp' is not a number; set decimal: ','" in faults(
+        tmp_path / "b.csv", content
+    )
+
+
+def test_counts_are_read_with_their_scale(tmp_path: Path) -> None:
+    """A column of encoder counts needs the scale of its map."""
+    counts = ImportMap(Column("t", "s"), {"x": Column("x", "counts", "2*pi/8 rad")})
+    recording = read_csv(put(tmp_path / "a.csv", "t,x\n0,1\n1,2\n"), counts)
+    np.testing.assert_allclose(recording.channels["x"].values, [np.pi / 4, np.pi / 2])
+
+
+@given(st.lists(st.floats(-1e12, 1e12), min_size=2, max_size=20), st.sampled_from(",;\t "), st.sampled_from(".,"))
+def test_numbers_survive_text(numbers: list[float], delimiter: str, decimal: str) -> None:
+    """Numbers written with all their digits are read bit for bit, whatever delimiter and decimal sign."""
+    import tempfile
+
+    if delimiter == decimal:
+        delimiter = ";"
+    lines = [f"{index}{delimiter}{number!r}".replace(".", decimal) for index, number in enumerate(numbers)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = put(Path(folder) / "a.csv", f"t{delimiter}x\n" + "\n".join(lines))
+        import_map = ImportMap(PLAIN.time, PLAIN.channels, decimal=decimal, delimiter=delimiter)
+        assert read_csv(path, import_map).channels["x"].values.tolist() == numbers
+
+
+def test_many_rows_are_read_in_pieces(tmp_path: Path) -> None:
+    """Files longer than one piece are joined in order."""
+    n = 120_000
+    path = put(tmp_path / "a.csv", "t,x\n" + "\n".join(f"{k},{-k}" for k in range(n)))
+    assert np.array_equal(read_csv(path, PLAIN).channels["x"].values, -np.arange(n))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            "timestamp,pos\n0,1\n1,2\n",
+            "a.yaml: channels.current: there is no column 2; columns: 0 'timestamp', 1 'pos'",
+        ),
+        (
+            "timestamp,p,cur\n0,1,2\n1,2,3\n",
+            "channels.position: there is no column 'pos'; columns: 0 'timestamp', 1 'p'",
+        ),
+        (
+            "timestamp,pos,pos\n0,1,2\n1,2,3\n",
+            "2 columns are called 'pos'; columns: 0 'timestamp', 1 'pos', 2 'pos'; give",
+        ),
+        ("timestamp,pos,cur\n0,1,2\n1,x,3\n", "a.csv: line 3: 'x' in column 'pos' is not a number; correct or empty"),
+        (
+            "timestamp,pos,cur\n0,1,2\n1,1,2\n2,1\n",
+            "a.csv: line 4 has 2 cells where 3 are expected; complete or remove",
+        ),
+        ("timestamp,pos,cur\n0,1,2\n0,1,2\n", "a.csv: time is not increasing at sample 1 (0.0000 s after 0.0000 s)"),
+        ("timestamp,pos,cur\n0,,2\n1,,2\n", "a.csv: channel 'position' has no value: all 2 samples are NaN"),
+        ("timestamp,pos,cur\n0,inf,2\n1,1,2\n", "a.csv: channel 'position' is infinite at sample 0"),
+        ("timestamp,pos,cur\n", "a.csv: there are no rows of numbers; at least two columns"),
+        ("", "a.csv: there are no rows of numbers"),
+    ],
+)
+def test_each_fault_of_a_file_is_told(tmp_path: Path, content: str, message: str) -> None:
+    """A file that does not fit its map is told by line, cell and column."""
+    assert message in faults(tmp_path / "a.csv", content)
+
+
+def test_faults_are_told_together_but_not_by_the_thousand(tmp_path: Path) -> None:
+    """Bad cells are told at once, ten of them at most."""
+    assert len(faults(tmp_path / "a.csv", "timestamp,pos,cur\n0,1,2\n1,a,b\n2,3,4\n").splitlines()) == 2
+    many = "timestamp,pos,cur\n0,1,2\n" + "1,a,b\n" * 1000
+    assert len(faults(tmp_path / "a.csv", many).splitlines()) == 10
+
+
+GOOD = {"time": "{column: timestamp, unit: s}", "channels": "{x: {column: x, unit: A}}", "format": "friction-ocp-map/1"}
+
+
+def map_of(**changes: str) -> str:
+    return "\n".join(f"{key}: {value}" for key, value in (GOOD | changes).items() if value != "-")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"format": "friction-ocp-map/9"}, "format: format is 'friction-ocp-map/9'; 'friction-ocp-map/1' is read here"),
+        ({"format": "-"}, "format: format is ''; 'friction-ocp-map/1'"),
+        (
+            {"chanels": "{}"},
+            "unknown key 'chanels'; available: format, time, channels, title, source, licence, delimiter",
+        ),
+        ({"time": "-"}, "time: there is nothing; a mapping of column, unit, scale"),
+        ({"time": "{column: t}"}, "time: there is no unit; {column, unit}"),
+        ({"time": "{column: t, unit: deg}"}, "time: unit 'deg' does not measure time; a unit such as s, ms or us"),
+        ({"time": "{column: -1, unit: s}"}, "time.column: column is -1; a header, or an index from 0"),
+        ({"time": "{column: true, unit: s}"}, "time.column: column is True; a header"),
+        ({"channels": "{}"}, "channels: there are no channels; name: {column, unit}"),
+        ({"channels": "[a]"}, "channels: this is a list; a mapping"),
+        ({"channels": "{x: {column: x, unit: furlong}}"}, "channels.x: unknown unit 'furlong'; accepted: rad"),
+        ({"channels": "{x: {column: x, unit: counts}}"}, "channels.x: unit 'counts' has no scale"),
+        ({"channels": "{x: {column: x, unit: [A]}}"}, "channels.x.unit: this is a list; text"),
+        (
+            {"channels": "{x: {column: x, unit: A, gain: 2}}"},
+            "channels.x: unknown key 'gain'; available: column, unit, scale",
+        ),
+        ({"channels": "{a/b: {column: x, unit: A}}"}, "channels.a/b: the name has a slash"),
+        ({"decimal": "'#'"}, "decimal: unknown decimal sign '#'; available: '.', ','"),
+        ({"delimiter": "'ab'"}, "delimiter: the delimiter is 'ab'; one character"),
+        ({"title": "{a: 1}"}, "title: this is a mapping; text"),
+        ({"title": "'open"}, "this is not YAML ("),
+    ],
+)
+def test_each_fault_of_a_map_is_told(tmp_path: Path, changes: dict[str, str], message: str) -> None:
+    """A map is checked strictly, and each finding names the key."""
+    with pytest.raises(FrictionOcpError) as caught:
+        load_import_map(put(tmp_path / "m.yaml", map_of(**changes)))
+    assert f"m.yaml: {message}" in str(caught.value)
+
+
+def test_all_faults_of_a_map_are_told_at_once(tmp_path: Path) -> None:
+    """One reading of a map tells everything that is wrong with it."""
+    content = map_of(format="x", time="{unit: s}", channels="{x: {column: x, unit: y}, z: 3}", colour="red")
+    with pytest.raises(FrictionOcpError) as caught:
+        load_import_map(put(tmp_path / "m.yaml", content))
+    assert len(caught.value.findings) == 5
+
+
+def test_other_formats_and_missing_files_are_told(tmp_path: Path) -> None:
+    """An unknown suffix lists the formats; a missing file or map is told as such."""
+    with pytest.raises(FrictionOcpError, match=r"a.xlsx: no reader for '.xlsx'; available: .csv, .tsv, .txt; export"):
+        import_recording(tmp_path / "a.xlsx", tmp_path / "m.yaml")
+    with pytest.raises(FrictionOcpError, match=r"m.yaml: there is no such map"):
+        import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
+    with pytest.raises(FrictionOcpError, match=r"a.csv: there is no such file"):
+        read_csv(tmp_path / "a.csv", PLAIN)
+
+
+def test_map_refuses_python_objects(tmp_path: Path) -> None:
+    """YAML tags that would run code are an error, not a call."""
+    content = map_of(title="!!python/object/apply:os.system ['true']")
+    with pytest.raises(FrictionOcpError, match="this is not YAML"):
+        load_import_map(put(tmp_path / "m.yaml", content))
+
+
+def test_inspection_lists_columns_rows_and_rate(tmp_path: Path) -> None:
+    """Whoever writes a map sees names, examples, how many numbers there are, and the rate."""
+    path = put(tmp_path / "a.csv", "state;t;x\non;0;5\non;0.01;\noff;0.02;7\noff;0.03;8\n")
+    summary = inspect_csv(path)
+    assert (summary.delimiter, summary.rows) == (";", 4)
+    assert summary.rate == pytest.approx(100.0)
+    assert [column.name for column in summary.columns] == ["state", "t", "x"]
+    assert summary.columns[2].examples == ("5", "", "7")
+    assert [column.numbers for column in summary.columns] == [0, 4, 3]
+
+
+def test_columns_without_header_are_numbered(tmp_path: Path) -> None:
+    """Without a header, columns are named by their index."""
+    assert sniff_layout(put(tmp_path / "a.txt", "0 1\n1 2\n")).names == ("column 0", "column 1")
