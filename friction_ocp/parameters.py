@@ -48,9 +48,15 @@ Value = Any
 """float, Free, Tie or Directional in a drive as read; float or SX in a drive whose values are bound."""
 
 
-def quantity(kind: str, meaning: str, default: Any = dataclasses.MISSING) -> Any:
-    """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader."""
-    return dataclasses.field(default=default, metadata={"kind": kind, "meaning": meaning})
+def quantity(
+    kind: str, meaning: str, default: Any = dataclasses.MISSING, nested: str | float | None = None
+) -> Any:
+    """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader.
+
+    `nested` says what the number is in the simpler model that is fitted first: the name of the field that it
+    equals there, a value, or "guess". None: it takes part from the beginning.
+    """
+    return dataclasses.field(default=default, metadata={"kind": kind, "meaning": meaning, "nested": nested})
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,8 @@ class Leaf:
     kind: str
     meaning: str
     motion: str = "rotary"
+    nested: str | float | None = None
+    """Path of the number that it equals in the simpler model fitted first, or its value there, or "guess"."""
 
 
 def inline() -> Any:
@@ -95,9 +103,17 @@ def leaves(part: Any, prefix: str, motion: str = "rotary") -> Iterator[Leaf]:
         if "kind" in item.metadata:
             for leaf_path, leaf in _split(value, path):
                 if leaf is not None and not isinstance(leaf, str):
-                    yield Leaf(leaf_path, leaf, item.metadata["kind"], item.metadata["meaning"], motion)
+                    nested = _nested_path(item, path, leaf_path)
+                    yield Leaf(leaf_path, leaf, item.metadata["kind"], item.metadata["meaning"], motion, nested)
         elif _is_part(value):
             yield from leaves(value, path, motion)
+
+
+def _nested_path(item: dataclasses.Field[Any], path: str, leaf_path: str) -> str | float | None:
+    nested = item.metadata["nested"]
+    if not isinstance(nested, str) or nested == "guess":
+        return nested
+    return f"{path.removesuffix(item.name)}{nested}{leaf_path.removeprefix(path)}"
 
 
 def _bound(value: Value, path: str, values: Mapping[str, Any]) -> Any:

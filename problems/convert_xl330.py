@@ -1,4 +1,7 @@
-"""Convert the XL330 logs of Rhoban/bam (JSON) into recordings: python problems/convert_xl330.py SOURCE_FOLDER [TARGET]."""
+"""Convert the XL330 logs of Rhoban/bam (JSON) into recordings.
+
+python problems/convert_xl330.py SOURCE_FOLDER [TARGET_FOLDER]; the target is data/xl330 unless stated.
+"""
 
 from __future__ import annotations
 

@@ -37,6 +37,8 @@ class Tolerances:
 
     decrease: float = 1e-8
     """Predicted decrease of the objective, relative to the objective."""
+    progress: float = 1e-7
+    """Actual decrease of three steps in a row, relative to the objective."""
     stalled: float = 1e-4
     """The same, where no damped step decreases the objective any more (kinks of the friction law)."""
     max_iterations: int = 100
@@ -48,7 +50,7 @@ def solve_gauss_newton(
     """Minimise a program from a start; the start is moved inside the bounds first."""
     point = Point(program.space.clip(start.theta), start.nodes)
     system = program.linearise(point)
-    damping, iteration = 1e-3, 0
+    damping, iteration, slow = 1e-3, 0, 0
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
     while iteration < tolerances.max_iterations:
@@ -58,7 +60,11 @@ def solve_gauss_newton(
             return _stuck(program, point, system, iteration, tolerances)
         if accepted.system is None:
             return Solution(point, system.objective, iteration, True, "the predicted decrease is below the tolerance")
+        gained = system.objective - accepted.system.objective
         point, system, damping = accepted.point, accepted.system, accepted.damping
+        slow = slow + 1 if gained <= tolerances.progress * system.objective else 0
+        if slow >= 3:
+            return Solution(point, system.objective, iteration, True, "three steps in a row gained next to nothing")
         if watch is not None:
             watch(iteration, system.objective, point)
     return Solution(point, system.objective, iteration, False, "iteration limit reached")

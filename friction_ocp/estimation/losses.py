@@ -42,19 +42,18 @@ class Squares(AbstractLoss):
 
 @dataclass(frozen=True)
 class Absolute(AbstractLoss):
-    """|r| / size, rounded below `rounding`: the likelihood of Laplace noise of mean size `size`."""
+    """|r|, rounded below `rounding`: the likelihood of Laplace noise."""
 
-    size: float
     rounding: float
 
     def cost(self, residual: FloatArray) -> FloatArray:
-        return (np.sqrt(residual**2 + self.rounding**2) - self.rounding) / self.size
+        return np.sqrt(residual**2 + self.rounding**2) - self.rounding
 
     def weight(self, residual: FloatArray) -> FloatArray:
-        return 1.0 / (np.sqrt(residual**2 + self.rounding**2) * self.size)
+        return 1.0 / np.sqrt(residual**2 + self.rounding**2)
 
     def curvature(self, residual: FloatArray) -> FloatArray:
-        return self.rounding**2 / ((residual**2 + self.rounding**2) ** 1.5 * self.size)
+        return self.rounding**2 / (residual**2 + self.rounding**2) ** 1.5
 
 
 @dataclass(frozen=True)

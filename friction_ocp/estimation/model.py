@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import numpy.typing as npt
 
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.errors import FrictionOcpError
@@ -16,6 +17,8 @@ from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_sp
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.sweep import Sweep
+
+ComplexArray = npt.NDArray[np.complex128]
 
 STEP_PER_RADIAN = 0.1
 """Integrator step over the inverse of the fastest oscillation: frequencies are then right to 0.04 %."""
@@ -109,14 +112,26 @@ def _speed_scale(drive: SteppedDrive, states: FloatArray) -> FloatArray:
 
 def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
     """Return the longest step, s, that resolves the fastest mode of the drive at the guesses, at standstill."""
-    tiny = 1e-7
-    x = ca.SX.sym("x", len(drive.state_names))  # pyright: ignore[reportArgumentType]
-    u = np.zeros(len(drive.input_names))
-    width = np.full(len(drive.mechanism.topology.roots) + 1, 1e6)
-    numbers = space.numbers(space.guess, problem.train[0].name)
-    after = drive.step(x, u, numbers, tiny, width)
-    slope = ca.Function("slope", [x], [ca.jacobian(after, x)])
-    rates = np.linalg.eigvals((np.asarray(slope(np.zeros(x.numel()))) - np.eye(x.numel())) / tiny)
-    fastest = float(np.max(np.abs(rates.imag), initial=0.0))
-    decay = float(np.max(np.abs(rates.real), initial=0.0))
-    return min(STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6), 10.0)
+    longest = 10.0
+    for use in problem.train:
+        typical = [_typical(use, name) for name in drive.input_names]
+        rates = _rates(drive, space.numbers(space.guess, use.name), typical)
+        fastest = float(np.max(np.abs(rates.imag), initial=0.0))
+        decay = float(np.max(-rates.real, initial=0.0))
+        longest = min(longest, STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6))
+    return longest
+
+
+def _typical(use: RecordingUse, name: str) -> float:
+    channel = use.recording.channels.get(name)
+    return float(np.nanquantile(channel.values, 0.75)) if channel is not None else 0.0
+
+
+def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> ComplexArray:
+    """Return the eigenvalues, 1/s, of the motion about standstill without dry friction."""
+    tiny, states = 1e-6, len(drive.state_names)
+    x = ca.SX.sym("x", states)  # pyright: ignore[reportArgumentType]
+    width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
+    after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
+    slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])
+    return np.linalg.eigvals((np.asarray(slope(np.zeros(states))) - np.eye(states)) / tiny).astype(complex)

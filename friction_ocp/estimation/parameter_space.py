@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.drive.parts import Drive
-from friction_ocp.drive.values import drive_leaves
+from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.expressions import parse, resolve_ties
-from friction_ocp.parameters import Free, Tie
+from friction_ocp.parameters import Free, Leaf, Tie
 from friction_ocp.simulation.grid import FloatArray
 
 
@@ -64,8 +64,13 @@ class ParameterSpace:
         return replace(self, guess=start)
 
 
-def parameter_space(problem: Problem, leaf_names: Sequence[str]) -> ParameterSpace:
-    """Collect the fitted parameters of a problem; `leaf_names` is the order of the model's numbers."""
+def parameter_space(
+    problem: Problem, leaf_names: Sequence[str], active: tuple[int, ...] | None = None
+) -> ParameterSpace:
+    """Collect the fitted parameters of a problem; `leaf_names` is the order of the model's numbers.
+
+    `active` are the indices of the numbers whose derivatives the model gives; None finds them.
+    """
     values = {leaf.path: leaf.value for leaf in drive_leaves(problem.drive)}
     free = {path: value for path, value in values.items() if isinstance(value, Free)}
     entries: list[tuple[str, Free]] = []
@@ -81,7 +86,7 @@ def parameter_space(problem: Problem, leaf_names: Sequence[str]) -> ParameterSpa
     symbols = {name: theta[k] for k, name in enumerate(names)}
     tables = {use.name: _table(problem.drive, values, symbols, use) for use in problem.recordings}
     leaf_vectors = {name: ca.vertcat(*[ca.SX(table[leaf]) for leaf in leaf_names]) for name, table in tables.items()}
-    active = _active(leaf_vectors, theta)
+    active = _active(leaf_vectors, theta) if active is None else active
     maps = {
         name: ca.Function(
             "numbers", [theta], [vector, ca.densify(ca.jacobian(ca.vertcat(*[vector[k] for k in active]), theta))]
@@ -119,7 +124,40 @@ def _table(drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.
             ties[path] = value.expr
         else:
             table[path] = value
+    table |= {name: symbol for name, symbol in symbols.items() if name not in table}
     return resolve_ties(ties, table)
+
+
+def nested_space(problem: Problem, space: ParameterSpace) -> ParameterSpace:
+    """Return the space of the simpler model that is fitted first; the same space where there is none.
+
+    Its friction has no Stribeck part, no curvature: what the fields of the laws declare as `nested`.
+    """
+    leaves = {leaf.path: leaf for leaf in drive_leaves(problem.drive)}
+    values = {path: leaf.value for path, leaf in leaves.items()}
+    simpler = {
+        path: _nested_value(leaf, values)
+        for path, leaf in leaves.items()
+        if leaf.nested is not None and isinstance(leaf.value, Free)
+    }
+    if not simpler:
+        return space
+    drive = bind_drive(problem.drive, values | simpler)
+    simple = parameter_space(replace(problem, drive=drive, constraints=()), space.leaf_names, space.active)
+    start = dict(zip(space.names, space.guess, strict=True))
+    return simple.moved(np.array([start[name] for name in simple.names]))
+
+
+def _nested_value(leaf: Leaf, values: Mapping[str, object]) -> object:
+    if not isinstance(leaf.nested, str):
+        return leaf.nested
+    if leaf.nested == "guess":
+        return leaf.value.guess
+    stem, _, _ = leaf.nested.rpartition(".")
+    for path in (leaf.nested, stem, f"{leaf.nested}.positive"):
+        if path in values:
+            return Tie(path) if isinstance(values[path], (Free, Tie)) else values[path]
+    return leaf.value.guess
 
 
 def _active(vectors: Mapping[str, ca.SX], theta: ca.SX) -> tuple[int, ...]:

@@ -27,7 +27,7 @@ class LoadDependence:
     """
 
     coulomb: Value = quantity("dimensionless", "Coulomb friction per transmitted torque", 0.0)
-    stribeck: Value = quantity("dimensionless", "Stribeck friction per transmitted torque", 0.0)
+    stribeck: Value = quantity("dimensionless", "Stribeck friction per transmitted torque", 0.0, nested=0.0)
     viscous: Value = quantity("load_viscous", "viscous friction per transmitted torque", 0.0)
 
     def along(self, direction: Direction) -> LoadDependence:

@@ -46,9 +46,8 @@ def soft_threshold(value: Any, upper: Any, lower: Any, width: Any = 0.0) -> Any:
     The result is 0 while -lower <= value <= upper (sticking), value - upper above and value + lower
     below; `width` rounds the two corners. The same function is the dead zone of a backlash.
     """
-    above = smooth_abs(value - upper, width)
-    below = smooth_abs(value + lower, width)
-    return value + 0.5 * (above - below + lower - upper)
+    level = where(value >= 0, upper, lower)
+    return value + 0.5 * (smooth_abs(value - level, width) - smooth_abs(value + level, width))
 
 
 def positive_part(value: Any) -> Any:

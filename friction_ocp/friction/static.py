@@ -69,10 +69,10 @@ class Stribeck(AbstractFrictionLaw):
     """
 
     tau_c: Value = quantity("torque", "Coulomb friction")
-    tau_s: Value = quantity("torque", "breakaway torque")
-    omega_s: Value = quantity("speed", "Stribeck speed")
+    tau_s: Value = quantity("torque", "breakaway torque", nested="tau_c")
+    omega_s: Value = quantity("speed", "Stribeck speed", nested="guess")
     viscous: Value = quantity("viscous", "viscous friction", 0.0)
-    delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0)
+    delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0, nested="guess")
     name: ClassVar[str] = "stribeck"
 
     def weakening(self, speed: Any) -> Any:
@@ -91,7 +91,7 @@ class Quadratic(AbstractFrictionLaw):
 
     tau_c: Value = quantity("torque", "Coulomb friction")
     viscous: Value = quantity("viscous", "viscous friction")
-    quadratic: Value = quantity("quadratic", "quadratic friction")
+    quadratic: Value = quantity("quadratic", "quadratic friction", nested=0.0)
     name: ClassVar[str] = "quadratic"
 
     def magnitude(self, speed: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,9 +23,9 @@ def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
     """Return the standard deviation of white noise on a smooth signal, NaN where there are too few samples.
 
     Fourth divided differences, scaled to unit noise gain, remove any local cubic; their median absolute deviation is
-    robust against steps and spikes. A signal that rests on one value says nothing there. Of a quantised signal nothing
-    below resolution / sqrt(12) is returned. Zero means that no noise is to be seen; noise slower than five samples
-    never is.
+    robust against steps and spikes. A signal that rests on one value says nothing there. A quantised signal has at
+    least resolution / sqrt(12), unless it is a smooth command on a grid. Zero means that no noise is to be seen; noise
+    slower than five samples never is.
     """
     t, y = _present(time, values)
     if len(t) < 9:
@@ -40,7 +39,7 @@ def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
         return _MAD_TO_STD * float(np.median(np.abs(residual)))
     robust = _MAD_TO_STD * float(np.median(np.abs(moving)))
     resolution = detect_resolution(y)
-    if resolution is None or robust > resolution:
+    if resolution is None or not 0.05 * resolution < robust <= resolution:
         return robust
     within = residual[np.abs(residual) <= 3.0 * resolution]
     return max(resolution / np.sqrt(12.0), float(np.sqrt(np.mean(within**2))))
@@ -55,16 +54,13 @@ def detect_resolution(values: npt.ArrayLike) -> float | None:
     levels = np.unique(y[np.isfinite(y)])
     if len(levels) < _MIN_LEVELS:
         return None
-    rounding = 8.0 * np.finfo(np.float64).eps * float(np.max(np.abs(levels)))
+    rounding = 1e4 * np.finfo(np.float64).eps * float(np.max(np.abs(levels)))
     gaps = np.diff(levels)
     gaps = gaps[gaps > rounding]
     if len(gaps) < _MIN_LEVELS - 1:
         return None
     step = _common_divisor(gaps, rounding)
-    if step is None:
-        return None
-    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
-    return float(np.sum(gaps) / counts[-1])
+    return None if step is None else float(np.sum(gaps) / np.sum(np.round(gaps / step)))
 
 
 def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
@@ -81,11 +77,21 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     at_extreme = (y == np.max(y)) | (y == np.min(y))
     if np.mean(at_extreme) < min_share or np.mean(~at_extreme) < 0.1:
         return False
-    runs = _runs(y)
-    usual = np.quantile([stop - start for start, stop in runs if not at_extreme[start]], 0.9)
-    long = [(start, stop) for start, stop in runs if at_extreme[start] and stop - start > max(2.0, 2.0 * usual)]
-    resolution = detect_resolution(y) or 0.0
-    stuck = sum(stop - start for start, stop in long if _is_abrupt(y, at_extreme, start, stop, resolution))
+    starts, stops = _runs(y)
+    lengths, outside = stops - starts, ~at_extreme[starts]
+    long = ~outside & (lengths > max(2.0, 2.0 * float(np.quantile(lengths[outside], 0.9))))
+    coarse = 4.0 * (detect_resolution(y) or 0.0)
+    usual = {
+        reach: float(np.median(np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]))
+        for reach in range(2, 6)
+    }
+    stuck = 0
+    for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
+        reach = min(max((stop - start) // 2, 2), 5)
+        # A parabola reached and left with slope s is s n / 4 high over n samples; a quantised one stays within levels.
+        height = float(np.mean(_moves(y, start, stop, 2))) / 2.0 * (stop - start) / 4.0
+        if max(_moves(y, start, stop, reach)) > max(0.25 * usual[reach], coarse) and height > coarse:
+            stuck += stop - start
     return stuck >= min_share * len(y)
 
 
@@ -130,41 +136,34 @@ def _fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _common_divisor(gaps: FloatArray, rounding: float) -> float | None:
-    """Return the largest step of which all gaps are multiples within rounding, by Euclid's algorithm."""
-    total = float(np.sum(gaps))
-    rest = gaps
-    while True:
-        step = float(np.min(rest))
-        tolerance = max(0.02 * step, rounding)
-        if step < 20.0 * rounding or total / step > 1e9:
-            return None
-        remainder = np.abs(gaps - step * np.round(gaps / step))
-        if np.all(remainder <= tolerance):
+    """Return the largest step of which all gaps are multiples, by Euclid's algorithm, or None.
+
+    With enough gaps the smallest is taken if it fits to 0.5 %: values may have been printed with few digits.
+    """
+    step = float(np.min(gaps))
+    if len(gaps) >= 8 and np.all(np.abs(gaps - step * np.round(gaps / step)) < 0.005 * step):
+        return step
+    while step > 1e3 * rounding:
+        misfit = np.flatnonzero(np.abs(gaps - step * np.round(gaps / step)) > rounding)
+        if not len(misfit):
             return step
-        rest = remainder[remainder > tolerance]
+        gap = rest = float(gaps[misfit[0]])
+        while rest > rounding:
+            step, rest = rest, abs(step - rest * round(step / rest))
+        step = gap / round(gap / step)
+    return None
 
 
-def _runs(y: FloatArray) -> list[tuple[int, int]]:
+def _runs(y: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Return start and stop of every run of equal values."""
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1
-    return list(pairwise([0, *(int(change) for change in changes), len(y)]))
+    return np.concatenate(([0], changes)), np.concatenate((changes, [len(y)]))
 
 
-def _is_abrupt(y: FloatArray, at_extreme: npt.NDArray[np.bool_], start: int, stop: int, resolution: float) -> bool:
-    """Tell whether the signal enters or leaves the run as fast as it moves elsewhere.
-
-    A parabola entered and left with slope s is s n / 4 high over n samples; a quantised one stays within few levels.
-    """
-
-    def moves(reach: int) -> list[float]:
-        before = [abs(float(y[start] - y[start - reach]))] if start >= reach else []
-        return before + ([abs(float(y[stop - 1] - y[stop - 1 + reach]))] if stop - 1 + reach < len(y) else [])
-
-    reach = min(max((stop - start) // 2, 2), 5)
-    elsewhere = np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]
-    height = float(np.mean(moves(2) or [0.0])) / 2.0 * (stop - start) / 4.0
-    fastest = max(moves(reach), default=0.0)
-    return fastest > max(0.25 * float(np.median(elsewhere)), 4.0 * resolution) and height > 4.0 * resolution
+def _moves(y: FloatArray, start: int, stop: int, reach: int) -> list[float]:
+    """Return how far the signal is from the value of a run, `reach` samples before and after it."""
+    places = [place for place in (start - reach, stop - 1 + reach) if 0 <= place < len(y)]
+    return [abs(float(y[place] - y[start])) for place in places] or [0.0]
 
 
 def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
@@ -183,12 +182,15 @@ def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
 
 
 def _penalty_for_noise(t: FloatArray, y: FloatArray, noise_std: float) -> float:
-    """Return the penalty that leaves a residual of the noise floor, by bisection on its logarithm."""
-    if not noise_std > 0.0:
-        return 0.0
+    """Return the penalty that leaves a residual of the noise floor, by bisection on its logarithm; 0 to interpolate."""
+
+    def residual(exponent: float) -> float:
+        return float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**exponent)) ** 2)))
+
     low, high = -4.0, 12.0
+    if not noise_std > residual(low):
+        return 0.0
     for _ in range(20):
         middle = 0.5 * (low + high)
-        residual = float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**middle)) ** 2)))
-        low, high = (middle, high) if residual < noise_std else (low, middle)
+        low, high = (middle, high) if residual(middle) < noise_std else (low, middle)
     return 10.0 ** (0.5 * (low + high))

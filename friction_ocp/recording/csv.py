@@ -120,19 +120,33 @@ def _split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for row in csv.reader([line], delimiter=delimiter, skipinitialspace=True) for cell in row]
 
 
-def _is_row(cells: Sequence[str]) -> bool:
-    return len(cells) > 1 and any(_NUMBER.fullmatch(cell) for cell in cells) and not cells[0].startswith("#")
+def _is_number(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None
 
 
-def _width(rows: Sequence[Sequence[str]]) -> int:
-    """Return how many cells most rows of numbers have."""
-    widths = Counter(len(cells) for cells in rows if _is_row(cells))
-    return widths.most_common(1)[0][0] if widths else 0
+def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return which lines are rows of the table: as wide as most lines with numbers, with the usual first number.
+
+    The usual first number (the time, mostly) tells rows from settings above them, such as "rate, 1000".
+    """
+    some = [cells for cells in rows if len(cells) > 1 and any(map(_is_number, cells)) and not cells[0].startswith("#")]
+    if not some:
+        return []
+    width = Counter(map(len, some)).most_common(1)[0][0]
+    some = [cells for cells in some if len(cells) == width]
+    shares = [sum(_is_number(cells[column]) for cells in some) / len(some) for column in range(width)]
+    usual = next((column for column, share in enumerate(shares) if share > 0.5), 0)
+    return [
+        index
+        for index, cells in enumerate(rows)
+        if len(cells) == width
+        and any(map(_is_number, cells))
+        and (_is_number(cells[usual]) or cells[usual].lower() in _MISSING)
+    ]
 
 
 def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
-    width = _width(rows)
-    return sum(bool(_NUMBER.fullmatch(cell)) for cells in rows if len(cells) == width for cell in cells)
+    return sum(_is_number(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
 
 
 def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], int]:
@@ -140,16 +154,16 @@ def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], int]:
 
     The header is the first of the lines right above the numbers that have as many cells; a line of units may follow it.
     """
-    width = _width(rows)
-    first = next(index for index, cells in enumerate(rows) if _is_row(cells) and len(cells) == width)
-    names: Sequence[str] = ()
+    first = _rows_of_numbers(rows)[0]
+    width = len(rows[first])
+    names: Sequence[str] = [""] * width
     for cells in reversed(rows[:first]):
         bare = [cells[0].lstrip("# "), *cells[1:]] if cells else []
-        bare = bare[1:] if bare and not bare[0] and len(bare) == width + 1 else bare
-        if len(bare) != width:
+        bare = bare[1:] if len(bare) == width + 1 and not bare[0] else bare
+        if len(bare) != width or any(map(_is_number, bare)):
             break
         names = bare
-    return tuple(name or f"column {index}" for index, name in enumerate(names or [""] * width)), first
+    return tuple(name or f"column {index}" for index, name in enumerate(names)), first
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:

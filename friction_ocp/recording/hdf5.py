@@ -59,8 +59,7 @@ def read_recording(path: str | Path) -> Recording:
 
 def write_recording(recording: Recording, path: str | Path) -> None:
     """Write a recording whole or not at all; raises FrictionOcpError if it could not be read again."""
-    where = str(path)
-    _raise(check_recording(recording, where) + check_written_names(recording, where))
+    _raise(check_recording(recording, str(path)) + check_written_names(recording, str(path)))
     with _writing(Path(path), RECORDING_FORMAT) as file:
         _write_provenance(file, recording)
         file.create_group("channels", track_order=True)
@@ -205,10 +204,9 @@ class _Reader:
 
     def quantity(self, path: str, label: str, assumed_unit: str = "") -> tuple[FloatArray, str] | None:
         """Return values in SI and their unit, or report why they cannot be had."""
-        values = self.array(path, label)
+        values, node = self.array(path, label), self.node(path)
         if values is None:
             return None
-        node = self.node(path)
         unit = self.text(node, "unit") or assumed_unit
         if not unit:
             self.report(f"{label} has no unit", "an attribute unit such as rad or A", "set it")

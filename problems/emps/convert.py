@@ -1,7 +1,7 @@
-"""Convert the EMPS benchmark (MATLAB) into recordings: FRICTION_OCP_EMPS=SOURCE python problems/emps/convert.py TARGET.
+"""Convert the EMPS benchmark (MATLAB) into recordings.
 
-No licence is stated for the data: SOURCE is your own download from nonlinearbenchmark.org, and what is written here must
-not be redistributed.
+FRICTION_OCP_EMPS=SOURCE_FOLDER python problems/emps/convert.py TARGET_FOLDER; the source is your own download from
+nonlinearbenchmark.org. No licence is stated for the data: do not redistribute what is written.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
+import scipy.io as _io  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
+
+io: Any = _io  # its own types are incomplete
 
 SOURCE = (
     "EMPS, nonlinearbenchmark.org; cite A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, "
@@ -27,7 +29,7 @@ FILES = {"DATA_EMPS.mat": "emps", "DATA_EMPS_PULSES.mat": "emps_pulses"}
 
 def convert(source: Path) -> Recording:
     """Read one run: position and reference in m, control voltage in V, motor force gtau * vir in N."""
-    content: dict[str, Any] = loadmat(source)
+    content: dict[str, Any] = io.loadmat(source)
     time, gain = _column(content, "t"), float(_column(content, "gtau")[0])
     columns = {
         "position": (_column(content, "qm"), "m"),

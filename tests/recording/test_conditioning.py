@@ -61,6 +61,13 @@ def test_noise_of_a_quantised_signal_is_that_of_rounding(resolution: float) -> N
     assert high_frequency_noise(times(), values) == pytest.approx(resolution / np.sqrt(12.0), rel=0.1)
 
 
+def test_command_on_a_grid_has_no_noise() -> None:
+    """Constant acceleration from rest visits multiples of one step, yet it is no quantised measurement."""
+    values = 4e-7 * np.arange(N) ** 2
+    assert detect_resolution(values) == pytest.approx(4e-7)
+    assert high_frequency_noise(times(), values) < 1e-10
+
+
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0])
 def test_noise_and_rounding_add(rng: np.random.Generator, ratio: float) -> None:
     """Noise before rounding adds to that of rounding in squares."""
@@ -94,6 +101,7 @@ def test_resolution_is_the_common_step(step: float, offset: float, counts: list[
 def test_resolution_of_continuous_and_switching_signals(rng: np.random.Generator) -> None:
     """Continuous values, single precision ones, and a few commanded levels have no resolution."""
     assert detect_resolution(rng.normal(size=N)) is None
+    assert detect_resolution(10.0 + 1e-9 * rng.normal(size=N)) is None
     assert detect_resolution(sine(times()).astype(np.float32)) is None
     assert detect_resolution([0.0, 1.0, 2.0, 1.0, 0.0]) is None
     assert detect_resolution([np.nan, np.nan]) is None
@@ -169,8 +177,8 @@ def test_smooth_motion_recovers_speed_and_acceleration(rng: np.random.Generator)
 def test_smooth_motion_without_noise_interpolates() -> None:
     """A signal without visible noise is interpolated, not smoothed."""
     time = times()
-    theta, _, _ = smooth_motion(time, time**2)
-    np.testing.assert_allclose(theta, time**2, atol=1e-9)
+    theta, _, _ = smooth_motion(time, sine(time))
+    np.testing.assert_allclose(theta, sine(time), atol=1e-7)
 
 
 def test_smooth_motion_needs_samples() -> None:

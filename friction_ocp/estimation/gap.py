@@ -1,0 +1,61 @@
+"""Weights of the continuity gaps: how far a state may jump between two segments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.model import Model
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+RELATIVE_GAP = 0.05
+"""Standard deviation of a gap over the typical size of its state, where no process noise is stated."""
+DETERMINISTIC_GAP = 1e-4
+"""The same for states that no noise enters: bristles, currents, the memory of a controller."""
+
+
+def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
+    """Return (segments - 1, states, states) W with W'W the inverse covariance of each gap."""
+    durations = np.diff(item.grid.time[first])[:-1]
+    if not model.problem.estimation.process_noise:
+        return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
+    return np.array([np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, span))) for span in durations])
+
+
+def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
+    """Return the covariance that torque noise gathers over `span` s in angles and speeds.
+
+    Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
+    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
+    """
+    mech = model.drive.mechanism
+    covariance = np.diag((DETERMINISTIC_GAP * model.state_scale) ** 2)
+    densities, inertias = _densities(model), _inertias(model, item)
+    position = {group: k for k, group in enumerate(mech.angle_groups)}
+    for k, group in enumerate(mech.free_groups):
+        v, q = len(mech.angle_groups) + k, position[group]
+        power = (densities[group] / inertias[group]) ** 2 * span
+        covariance[v, v] += power
+        covariance[q, q] += power * span**2 / 3.0
+        covariance[q, v] += power * span / 2.0
+        covariance[v, q] += power * span / 2.0
+    return covariance
+
+
+def _densities(model: Model) -> FloatArray:
+    """Return the torque noise of each group, referred to its first shaft."""
+    mech = model.drive.mechanism
+    total = np.zeros(len(mech.topology.roots))
+    for shaft, density in model.problem.estimation.process_noise.items():
+        total[mech.topology.group_of[shaft]] += density**2
+    return np.sqrt(total)
+
+
+def _inertias(model: Model, item: Experiment) -> FloatArray:
+    import casadi as ca
+
+    mech = model.drive.mechanism
+    symbols = ca.vertcat(*mech.parameters.values())
+    values = [ca.SX(mech.inertia(group)) for group in range(len(mech.topology.roots))]
+    function = ca.Function("inertia", [symbols], [ca.vertcat(*values)])
+    return np.asarray(function(model.space.numbers(model.space.guess, item.name))).ravel()

@@ -1,0 +1,116 @@
+"""The stages of a fit: from predictions out of measured motion, over relaxed segments, to the free run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.gap import gap_weights
+from friction_ocp.estimation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+PREDICTION_SAMPLES = 20
+ROUNDINGS = (1.0, 0.2, 0.05, 0.01)
+"""Rounding of the absolute loss over the mean error, stage by stage."""
+WIDTHS = (0.1, 0.02, 0.0)
+"""Smoothing of the sign over the typical speed, stage by stage; the last is exact."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One program to solve and what to call it."""
+
+    name: str
+    program: Program
+
+
+def program_of(model: Model, segments: tuple[Segments, ...], width: float, loss: AbstractLoss) -> Program:
+    """Return the program of the training recordings cut into `segments`."""
+    scale = model.speed_scale.copy()
+    return Program(
+        space=model.space,
+        drive=model.drive,
+        sweep=model.sweep,
+        experiments=model.train,
+        segments=segments,
+        noise=model.noise,
+        width=width * scale,
+        loss=loss,
+    )
+
+
+def cuts(experiment: Experiment, samples: int) -> IntArray:
+    """Return the first nodes of segments of about `samples` intervals, the last node behind them."""
+    last = experiment.grid.time.size - 1
+    count = max(1, round(last / samples))
+    return np.unique(np.round(np.linspace(0, last, count + 1)).astype(np.int64))
+
+
+def predictions(model: Model, width: float) -> Program:
+    """Return short predictions from the smoothed motion: nearly linear in the parameters, right from any start."""
+    segments = [cuts(item, PREDICTION_SAMPLES) for item in model.train]
+    held = tuple(Segments(first, None, measured=len(first) - 1) for first in segments)
+    return program_of(model, held, width, Squares())
+
+
+def relaxed(model: Model, width: float, loss: AbstractLoss) -> Program:
+    """Return segments joined by process noise."""
+    options = model.problem.estimation
+    segments: list[Segments] = []
+    for item in model.train:
+        first = cuts(item, options.segment)
+        weights = gap_weights(model, item, first)
+        segments.append(_with_start(model, Segments(first, weights)))
+    return program_of(model, tuple(segments), width, loss)
+
+
+def free_run(model: Model, width: float, loss: AbstractLoss, horizon: float | None) -> Program:
+    """Return the free run over whole recordings, or over windows of `horizon` s that each start afresh."""
+    segments: list[Segments] = []
+    for item in model.train:
+        first = windows(item, horizon)
+        segments.append(_with_start(model, Segments(first, None)))
+    return program_of(model, tuple(segments), width, loss)
+
+
+def windows(item: Experiment, horizon: float | None) -> IntArray:
+    """Return the first nodes of windows of about `horizon` s; the whole recording where it is None."""
+    duration = float(item.grid.time[-1] - item.grid.time[0])
+    count = 1 if horizon is None else max(1, round(duration / horizon))
+    edges = np.linspace(item.grid.time[0], item.grid.time[-1], count + 1)
+    return np.unique(np.clip(np.searchsorted(item.grid.time, edges - 1e-9), 0, item.grid.time.size - 1))
+
+
+def _with_start(model: Model, cut: Segments) -> Segments:
+    """Tie the first state to the measurement: exactly, or with a prior of its typical size."""
+    if model.problem.estimation.initial_state == "measured":
+        return replace(cut, measured=1)
+    return replace(cut, start_weight=1.0 / model.state_scale)
+
+
+def mean_error(program: Program, point: Point) -> float:
+    """Return the mean absolute error of all samples over their noise floors."""
+    sizes: list[FloatArray] = []
+    for index, item in enumerate(program.experiments):
+        errors = program.residuals(index, program.simulate(index, point).y)
+        sizes.append(np.abs(errors[np.isfinite(item.measured)]))
+    return float(np.mean(np.concatenate(sizes)))
+
+
+def losses(model: Model, program: Program, point: Point) -> Iterator[AbstractLoss]:
+    """Yield the losses of the successive stages of a fit."""
+    match model.problem.estimation.loss:
+        case "squares":
+            yield from (Squares(),) * len(WIDTHS)
+        case "huber":
+            yield from (Huber(),) * len(WIDTHS)
+        case "student_t":
+            yield from (StudentT(),) * len(WIDTHS)
+        case "absolute":
+            size = mean_error(program, point)
+            yield from (Absolute(rounding * size) for rounding in ROUNDINGS)

@@ -1,0 +1,60 @@
+"""Every figure of an identification as PNG and SVG."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friction_ocp.plots.correlation import correlation_figure
+from friction_ocp.plots.curves import friction_figures
+from friction_ocp.plots.overview import overview_figure
+from friction_ocp.plots.series import Series
+from friction_ocp.plots.style import figure_style, save
+from friction_ocp.plots.traces import traces_figure
+from friction_ocp.plots.whiteness import whiteness_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_figures(result: Mapping[str, Any], series: Series, folder: Path) -> list[Path]:
+    """Draw all figures of a result into `folder`, which is made if need be, and return their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths: list[Path] = []
+    taken: set[str] = set()
+    with figure_style():
+        for name, figure in _figures(result, series):
+            paths += save(figure, folder / _file_stem(name, taken))
+    return paths
+
+
+def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, Figure]]:
+    """Yield the name and figure of whatever the result has, one at a time to hold few in memory."""
+    if result.get("parameters"):
+        yield "parameters", overview_figure(result["parameters"])
+    yield from (
+        (f"traces-{recording}", traces_figure(recording, channels, result.get("channel_units", {})))
+        for recording, channels in series.items()
+        if channels
+    )
+    yield from (
+        (f"friction-{shaft}", figure) for shaft, figure in friction_figures(result.get("friction_curves") or [])
+    )
+    if any((result.get("residuals") or {}).values()):
+        yield "residual-autocorrelation", whiteness_figure(result["residuals"])
+    if (result.get("correlation") or {}).get("names"):
+        yield "correlation", correlation_figure(result["correlation"])
+
+
+def _file_stem(name: str, taken: set[str]) -> str:
+    """Return a file name that no recording name can lead out of the folder or onto another figure."""
+    stem = re.sub(r"[^\w.-]+|\.{2,}", "_", name.removesuffix(".h5"), flags=re.ASCII)[:100]
+    unique = stem
+    count = 1
+    while unique.lower() in taken:
+        count += 1
+        unique = f"{stem}-{count}"
+    taken.add(unique.lower())
+    return unique

@@ -1,0 +1,128 @@
+"""One self-contained HTML file for a result: text, tables, plots and the library that draws them."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from friction_ocp.plots import palette
+from friction_ocp.plots.numbers import plain
+from friction_ocp.plots.series import Series
+from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
+from friction_ocp.report.sentence import verdict_sentence
+from friction_ocp.report.tables import SPLITS, correlation_rows, fit_rows, fit_rows_by_recording, parameter_rows
+
+_HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class EmbeddedRecording:
+    """A recording with what the script needs to draw it, as JSON."""
+
+    index: int
+    name: str
+    split: str
+    traces: str
+    residuals: str
+
+
+def write_report(result: Mapping[str, Any], series: Series, path: Path) -> None:
+    """Write report.html in one step: a reader sees the old file or the whole new one."""
+    replace_file(path, render_report(result, series))
+
+
+def render_report(result: Mapping[str, Any], series: Series) -> str:
+    """Return the page of an identification."""
+    solver, provenance = result.get("solver") or {}, result.get("provenance") or {}
+    return render_page(
+        "identify.html",
+        {
+            "result": result,
+            "converged": result.get("status") == "converged",
+            "verdict": verdict_sentence(result),
+            "parameters": parameter_rows(result.get("parameters") or {}),
+            "fit": fit_rows(result.get("fit") or {}),
+            "horizon": plain((result.get("fit") or {}).get("horizon_s")),
+            "parts": fit_rows_by_recording(result.get("fit") or {}),
+            "recordings": _recordings(result, series),
+            "friction": friction_payload(result.get("friction_curves") or []),
+            "friction_json": embedded_json(friction_payload(result.get("friction_curves") or [])),
+            "correlation": correlation_rows(result.get("correlation") or {}),
+            "solver": {str(key).replace("_", " "): _fact(value) for key, value in solver.items()},
+            "provenance": {
+                str(key).replace("_", " "): _fact(value) for key, value in provenance.items() if key != "recordings"
+            },
+            "checksums": provenance.get("recordings") or {},
+        },
+    )
+
+
+def render_page(template: str, context: Mapping[str, Any]) -> str:
+    """Fill a template of this package; only the page's own two scripts may run, and nothing may be loaded."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    def breakable(name: str) -> Markup:
+        return Markup("<wbr>").join(re.split(r"(?<=[._@/-])", name))
+
+    environment = Environment(
+        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    library = str(get_plotlyjs())
+    scripts = [library, (_HERE / "report.js").read_text(encoding="utf-8")]
+    return environment.get_template(template).render(
+        context,
+        policy=_content_policy(scripts),
+        plotly=Markup(library),  # trusted: a file of the installed plotly
+        script=Markup(scripts[1]),
+        style=Markup((_HERE / "report.css").read_text(encoding="utf-8")),
+        palette=palette,
+        literal=Markup,  # for what embedded_json has made safe
+        breakable=breakable,
+    )
+
+
+def replace_file(path: Path, text: str) -> None:
+    """Write a text file under another name beside it and rename that, so that it is never half written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        draft.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(draft, path)  # noqa: PTH105
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _recordings(result: Mapping[str, Any], series: Series) -> list[EmbeddedRecording]:
+    """Return the recordings in the order of the result, then any that only the series have."""
+    roles: Mapping[str, Sequence[str]] = result.get("recordings") or {}
+    splits = {name: split for key, split in SPLITS.items() for name in roles.get(key) or ()}
+    units, residuals = result.get("channel_units") or {}, result.get("residuals") or {}
+    return [
+        EmbeddedRecording(
+            index,
+            name,
+            splits.get(name, "other"),
+            embedded_json(recording_payload(series.get(name, {}), units)),
+            embedded_json(residual_payload(residuals.get(name, {}))),
+        )
+        for index, name in enumerate(dict.fromkeys([*splits, *series]))
+    ]
+
+
+def _fact(value: Any) -> str:
+    return plain(value) if isinstance(value, float) else str(value)
+
+
+def _content_policy(scripts: Sequence[str]) -> str:
+    """Return the Content-Security-Policy that allows these scripts by their hash and no network at all."""
+    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; font-src data:"

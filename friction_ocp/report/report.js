@@ -1,0 +1,234 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const narrow = () => window.innerWidth < 640;
+  const colour = (name) => getComputedStyle(root).getPropertyValue("--" + name).trim();
+  // Plotly reads a little HTML and %{...} in its texts: names are shown as they are.
+  const literal = (text) =>
+    String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;").replace(/%\{/g, "%\u200b{");
+  const within = (unit) => (unit ? " in " + literal(unit) : "");
+  const embedded = (selector) => JSON.parse(document.querySelector(selector).textContent);
+  const config = {
+    responsive: true,
+    displaylogo: false,
+    plotlyServerURL: "",
+    // Named one by one: plotly's own set has a button that sends the data to its makers.
+    modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
+  };
+
+  const axis = (title, more) => ({
+    title: { text: title, standoff: 8, font: { size: 12 } },
+    gridcolor: colour("grid"),
+    linecolor: colour("line"),
+    zerolinecolor: colour("line"),
+    zeroline: true,
+    automargin: true,
+    exponentformat: "power",
+    ...more,
+  });
+  const layout = (more) => ({
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("ink") },
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("line"), font: { color: colour("ink") } },
+    margin: { l: 56, r: 8, t: 34, b: 42 },
+    legend: { orientation: "h", x: 0, y: 1.0, yanchor: "bottom", bgcolor: "rgba(0,0,0,0)" },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("muted"), activecolor: colour("accent") },
+    // A finger on a plot scrolls the page; the buttons above it turn zooming on.
+    dragmode: window.matchMedia("(pointer: coarse)").matches ? false : "zoom",
+    hovermode: "x unified",
+    ...more,
+  });
+
+  function tracesFigure(channel) {
+    const line = (name, y, stroke, width, more) => ({
+      type: "scatter", mode: "lines", name, x: channel.time, y, line: { color: colour(stroke), width },
+      hovertemplate: "%{y:.6~g}" + (channel.unit ? " " + literal(channel.unit) : ""), ...more,
+    });
+    const thinned = channel.shown < channel.samples;
+    return {
+      title: channel.name,
+      label: "Measured and simulated " + channel.name + ", and the residual, over time",
+      note: thinned
+        ? `${channel.shown} of ${channel.samples} samples, every peak among them. Drag to zoom, double click to reset.`
+        : "Drag to zoom, double click to reset.",
+      height: narrow() ? 380 : 440,
+      data: [
+        line("measured", channel.measured, "measured", 2),
+        line("simulated", channel.simulated, "simulated", 1.3),
+        line("residual", channel.residual, "residual", 1, { yaxis: "y2" }),
+      ],
+      layout: {
+        hoversubplots: "axis",
+        xaxis: axis("time in s", { anchor: "y2", zeroline: false }),
+        yaxis: axis("value" + within(channel.unit), { domain: [0.37, 1] }),
+        yaxis2: axis("residual" + within(channel.unit), { domain: [0, 0.29] }),
+      },
+    };
+  }
+
+  function frictionFigure(plot) {
+    const data = plot.curves.flatMap((curve, index) => {
+      const stroke = colour("curve-" + (index % 7));
+      const shared = { type: "scatter", mode: "lines", legendgroup: String(index) };
+      const band = {
+        ...shared, x: curve.speed.concat(curve.speed.slice().reverse()),
+        y: curve.upper.concat(curve.lower.slice().reverse()), fill: "toself", fillcolor: stroke, opacity: 0.2,
+        line: { width: 0 }, hoverinfo: "skip", showlegend: false,
+      };
+      const line = {
+        ...shared, x: curve.speed, y: curve.torque, name: literal(curve.label), line: { color: stroke, width: 2 },
+        hovertemplate: "%{y:.4~g} " + literal(plot.torque_unit),
+      };
+      return curve.upper.length === curve.speed.length && curve.lower.length ? [band, line] : [line];
+    });
+    return {
+      title: plot.shaft + " (" + plot.laws + ")",
+      label: "Friction torque of " + plot.shaft + " over speed, with its 95 % band",
+      height: narrow() ? 320 : 380,
+      data,
+      layout: {
+        showlegend: plot.curves.length > 1,
+        xaxis: axis("speed" + within(plot.speed_unit)),
+        yaxis: axis("friction torque" + within(plot.torque_unit)),
+      },
+    };
+  }
+
+  function residualFigure(residual) {
+    const band = residual.band === null ? [] : [{
+      type: "rect", xref: "paper", x0: 0, x1: 1, y0: -residual.band, y1: residual.band, layer: "below",
+      line: { width: 0 }, fillcolor: colour("muted"), opacity: 0.25,
+    }];
+    return {
+      title: residual.name + ": " + (residual.white ? "white" : "not white"),
+      label: "Autocorrelation of the residual of " + residual.name + " over the lag",
+      height: 290,
+      data: [{
+        type: "scatter", mode: "lines", name: "autocorrelation", x: residual.lag, y: residual.autocorrelation,
+        line: { color: colour("residual"), width: 1.6 }, hovertemplate: "%{y:.3f}",
+      }],
+      layout: {
+        shapes: band,
+        xaxis: axis("lag in s", { zeroline: false }),
+        yaxis: axis("autocorrelation", { range: [-1.05, 1.05] }),
+      },
+    };
+  }
+
+  function frame(holder, figure) {
+    const element = document.createElement("figure");
+    const heading = document.createElement("h3");
+    const plot = document.createElement("div");
+    heading.textContent = figure.title;
+    plot.className = "plot";
+    plot.setAttribute("role", "img");
+    plot.setAttribute("aria-label", figure.label);
+    element.append(heading, plot);
+    if (figure.note) {
+      const note = document.createElement("figcaption");
+      note.textContent = figure.note;
+      note.className = "screen";
+      element.append(note);
+    }
+    holder.append(element);
+    return plot;
+  }
+
+  // All frames stand before the first plot measures the room it has.
+  function drawAll(holder, figures) {
+    const plots = figures.map((figure) => frame(holder, figure));
+    figures.forEach((figure, index) =>
+      Plotly.newPlot(plots[index], figure.data, layout({ height: figure.height, ...figure.layout }), config));
+    return plots;
+  }
+
+  // Zooming the time of one channel zooms it in all channels of the recording.
+  function linkTime(plots) {
+    let busy = false;
+    plots.forEach((plot) => plot.on("plotly_relayout", (change) => {
+      const time = Object.fromEntries(Object.entries(change).filter(([key]) => key.startsWith("xaxis.")));
+      if (busy || !Object.keys(time).length) return;
+      busy = true;
+      Promise.all(plots.filter((other) => other !== plot).map((other) => Plotly.relayout(other, time)))
+        .finally(() => { busy = false; });
+    }));
+  }
+
+  const figures = { traces: tracesFigure, residuals: residualFigure };
+  const holder = (kind) => document.querySelector(`[data-plots="${kind}"]`);
+  const clear = (element) => {
+    element.querySelectorAll(".plot").forEach((plot) => Plotly.purge(plot));
+    element.replaceChildren();
+  };
+
+  function show(kind) {
+    const select = document.querySelector(`[data-choose="${kind}"]`);
+    const element = holder(kind);
+    if (!select || !element) return;
+    clear(element);
+    const content = embedded(`script[data-${kind}="${select.value}"]`);
+    const plots = drawAll(element, content.map(figures[kind]));
+    if (!plots.length) element.textContent = "Nothing was recorded here that can be drawn.";
+    if (kind === "traces") linkTime(plots);
+    const name = select.selectedOptions[0].textContent;
+    document.querySelectorAll(`[data-shown="${kind}"]`).forEach((shown) => { shown.textContent = name; });
+    select.parentElement.querySelectorAll("[data-step]").forEach((button) => {
+      const next = select.selectedIndex + Number(button.dataset.step);
+      button.disabled = next < 0 || next >= select.options.length;
+    });
+  }
+
+  function showAll() {
+    Object.keys(figures).forEach(show);
+    const friction = holder("friction");
+    if (!friction) return;
+    clear(friction);
+    drawAll(friction, embedded("script[data-friction]").map(frictionFigure));
+  }
+
+  document.querySelectorAll("[data-choose]").forEach((select) => {
+    select.addEventListener("change", () => show(select.dataset.choose));
+    select.parentElement.querySelectorAll("[data-step]").forEach((button) => button.addEventListener("click", () => {
+      select.selectedIndex += Number(button.dataset.step);
+      show(select.dataset.choose);
+    }));
+  });
+
+  function sortBy(header) {
+    const table = header.closest("table");
+    const column = header.cellIndex;
+    const sign = header.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+    const numeric = header.classList.contains("number") || /^Verdict/.test(header.textContent);
+    const key = (row) => row.cells[column].dataset.key || "";
+    const compare = (a, b) => {
+      const [left, right] = [key(a), key(b)];
+      if (left === "" || right === "") return (left === "") - (right === "");
+      return sign * (numeric ? Number(left) - Number(right) : left.localeCompare(right, "en", { numeric: true }));
+    };
+    const body = table.tBodies[0];
+    body.append(...Array.from(body.rows).sort(compare));
+    table.querySelectorAll("th[aria-sort]").forEach((other) => other.setAttribute("aria-sort", "none"));
+    header.setAttribute("aria-sort", sign === 1 ? "ascending" : "descending");
+  }
+  document.querySelectorAll("table.sortable th[aria-sort]").forEach((header) =>
+    header.querySelector("button").addEventListener("click", () => sortBy(header)));
+
+  // Paper is white and narrower than most windows.
+  const onPaper = (printing) => {
+    root.classList.toggle("printing", printing);
+    document.querySelectorAll("details").forEach((details) => { details.open = printing; });
+    const theme = {
+      "font.color": colour("ink"), "xaxis.gridcolor": colour("grid"), "yaxis.gridcolor": colour("grid"),
+      width: printing ? 680 : undefined, autosize: !printing,
+    };
+    document.querySelectorAll(".plot").forEach((plot) => {
+      const paired = plot.closest(".pairs") && printing;
+      Plotly.relayout(plot, { ...theme, width: paired ? 325 : theme.width });
+    });
+  };
+  window.addEventListener("beforeprint", () => onPaper(true));
+  window.addEventListener("afterprint", () => onPaper(false));
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", showAll);
+  showAll();
+})();

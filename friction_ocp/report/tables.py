@@ -1,0 +1,158 @@
+"""Rows of the tables, with numbers already written out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from friction_ocp.plots.numbers import NOTHING, is_number, percent, plain, significant, to_resolution, unit_text
+from friction_ocp.plots.palette import NEGATIVE, POSITIVE, VERDICT_WORDS
+
+SPLITS = {"train": "training", "validation": "validation"}
+"""What the keys of the result are called on the page."""
+
+_SIGNS = {"ok": "✓", "at_bound": "▲", "traded": "⇄", "not_identifiable": "✕"}
+_ORDER = ("not_identifiable", "at_bound", "traded", "ok")  # worst first
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What stands in a cell, and what it is sorted by; nothing sorts last."""
+
+    text: str
+    key: float | str | None = None
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One estimate."""
+
+    name: str
+    unit: str
+    unit_text: str
+    value: Cell
+    interval: Cell
+    std_error: Cell
+    guess: Cell
+    verdict: str
+    word: str
+    sign: str
+    rank: int
+    traded_with: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FitRow:
+    """The error of one channel on the training or the validation recordings."""
+
+    recordings: str
+    """Which recordings: a name, or what they served for."""
+    unit_text: str
+    rms: str
+    mae: str
+    relative: str
+    relative_norm: str
+    noise_ratio: str
+    noise_source: str
+
+
+@dataclass(frozen=True)
+class CorrelationCell:
+    """One entry of the matrix and the colour behind it."""
+
+    text: str
+    background: str
+    strong: bool
+
+
+def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[ParameterRow]:
+    """Return the rows of the parameter table in the order of the result."""
+    return [_parameter_row(name, parameter) for name, parameter in parameters.items()]
+
+
+def _parameter_row(name: str, parameter: Mapping[str, Any]) -> ParameterRow:
+    value, std_error = parameter.get("value"), parameter.get("std_error")
+    verdict = str(parameter.get("verdict", ""))
+    unit = str(parameter.get("unit", ""))
+    return ParameterRow(
+        name=name,
+        unit=unit,
+        unit_text=unit_text(unit),
+        value=Cell(to_resolution(value, std_error), _key(value)),
+        interval=_interval(parameter.get("interval95"), std_error),
+        std_error=Cell(significant(std_error, 2), _key(std_error)),
+        guess=Cell(plain(parameter.get("guess")), _key(parameter.get("guess"))),
+        verdict=verdict if verdict in _SIGNS else "other",
+        word=VERDICT_WORDS.get(verdict, verdict or NOTHING),
+        sign=_SIGNS.get(verdict, ""),
+        rank=_ORDER.index(verdict) if verdict in _ORDER else len(_ORDER),
+        traded_with=tuple(str(other) for other in parameter.get("traded_with") or ()),
+    )
+
+
+def _interval(bounds: Any, std_error: Any) -> Cell:
+    """Return both bounds, sorted by the width between them; an open side is infinite."""
+    if not bounds or not any(is_number(bound) for bound in bounds):
+        return Cell(NOTHING)
+    first, last = (
+        to_resolution(bound, std_error) if is_number(bound) else sign + "∞"
+        for bound, sign in zip(bounds, ("-", ""), strict=True)
+    )
+    width = bounds[1] - bounds[0] if all(is_number(bound) for bound in bounds) else None
+    return Cell(f"[{first}, {last}]", width)
+
+
+def _key(value: Any) -> float | None:
+    return float(value) if is_number(value) else None
+
+
+def fit_rows(fit: Mapping[str, Any]) -> dict[str, list[FitRow]]:
+    """Return the training and the validation row of each channel."""
+    rows: dict[str, list[FitRow]] = {}
+    for key, split in SPLITS.items():
+        for channel, errors in (fit.get(key) or {}).items():
+            rows.setdefault(channel, []).append(_fit_row(split, errors))
+    return rows
+
+
+def fit_rows_by_recording(fit: Mapping[str, Any]) -> dict[str, list[FitRow]]:
+    """Return the rows of each channel's recordings; where there is only a number, it is the rms."""
+    rows: dict[str, list[FitRow]] = {}
+    for key, split in SPLITS.items():
+        for channel, errors in (fit.get(key) or {}).items():
+            shared = {"unit": errors.get("unit"), "noise_source": errors.get("noise_source")}
+            for recording, part in (errors.get("by_recording") or {}).items():
+                own: Mapping[str, Any] = part if isinstance(part, Mapping) else {"rms": part}
+                rows.setdefault(channel, []).append(_fit_row(f"{recording} ({split})", {**shared, **own}))
+    return rows
+
+
+def _fit_row(recordings: str, errors: Mapping[str, Any]) -> FitRow:
+    return FitRow(
+        recordings=recordings,
+        unit_text=unit_text(str(errors.get("unit") or "")),
+        rms=significant(errors.get("rms"), 3),
+        mae=significant(errors.get("mae"), 3),
+        relative=percent(errors.get("relative")),
+        relative_norm=percent(errors.get("relative_norm")),
+        noise_ratio=significant(errors.get("noise_ratio"), 3),
+        noise_source=str(errors.get("noise_source") or NOTHING),
+    )
+
+
+def correlation_rows(correlation: Mapping[str, Any]) -> list[tuple[str, list[CorrelationCell]]]:
+    """Return name and cells of each row of the matrix."""
+    names = [str(name) for name in correlation.get("names") or ()]
+    return [
+        (name, [_correlation_cell(value) for value in row])
+        for name, row in zip(names, correlation.get("matrix") or (), strict=True)
+    ]
+
+
+def _correlation_cell(value: Any) -> CorrelationCell:
+    if not is_number(value):
+        return CorrelationCell(NOTHING, "transparent", strong=False)
+    strength = min(1.0, abs(value))
+    base = POSITIVE if value > 0 else NEGATIVE
+    return CorrelationCell(f"{value:.2f}".replace("-", "−"), f"{base}{round(255 * strength):02x}", strength > 0.75)
