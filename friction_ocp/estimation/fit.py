@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.stages import WIDTHS, free_run, losses, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray
 
@@ -24,38 +25,35 @@ RELEASES = (0.02, 0.1, 0.5)
 """Stribeck speeds, over the typical speed of the drive, from which the released parameters start."""
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """The solution and the program that it solves: exact friction, the loss asked for."""
+
+    solution: Solution
+    program: Program
+
+
 def silent(phase: str, iteration: int, objective: float, point: Point) -> None:
     """Report nothing."""
 
 
-def fit(model: Model, progress: Progress = silent) -> Solution:
+def fit(model: Model, progress: Progress = silent) -> Fitted:
     """Fit the parameters of a problem from its guesses."""
-    builder = _free_run_builder(model) if fits_free_run(model) else _relaxed_builder(model)
+    builder = program_builder(model)
     candidates = _candidates(model, builder, progress)
     best = _tournament(model, builder, candidates, "candidate", progress)
     return _finish(model, builder, best, progress)
 
 
-def fits_free_run(model: Model) -> bool:
-    """Whether the fit minimises the error of the free run rather than that of relaxed segments."""
-    chosen = model.problem.estimation.fit
-    return chosen == "simulation" if chosen else horizon(model) is None
-
-
-def horizon(model: Model) -> float | None:
-    """Return the length, s, over which a free run is judged; None is the whole recording."""
-    return model.problem.estimation.horizon_s
-
-
 Builder = Callable[[Model, float, AbstractLoss], Program]
 
 
-def _free_run_builder(model: Model) -> Builder:
-    return lambda model, width, loss: free_run(model, width, loss, horizon(model))
-
-
-def _relaxed_builder(model: Model) -> Builder:
-    return relaxed
+def program_builder(model: Model) -> Builder:
+    """Return what makes the program of the fit for a smoothing width and a loss."""
+    if fits_free_run(model):
+        span = horizon(model)
+        return lambda model, width, loss: free_run(model, model.train, width, loss, span)
+    return lambda model, width, loss: relaxed(model, model.train, width, loss)
 
 
 def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, progress: Progress) -> Solution:
@@ -64,7 +62,7 @@ def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, p
 
 def _predicted(model: Model, progress: Progress) -> FloatArray:
     """Return the parameters that best predict the smoothed motion over short times."""
-    program = predictions(model, WIDTHS[0])
+    program = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
     return _solve(program, start, COARSE, "short predictions", progress).point.theta
 
@@ -112,7 +110,7 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     return starts
 
 
-def _finish(model: Model, builder: Builder, point: Point, progress: Progress) -> Solution:
+def _finish(model: Model, builder: Builder, point: Point, progress: Progress) -> Fitted:
     """Sharpen width and loss down to the exact problem."""
     program = builder(model, WIDTHS[0], Squares())
     stages = list(losses(model, program, point))
@@ -123,4 +121,4 @@ def _finish(model: Model, builder: Builder, point: Point, progress: Progress) ->
         solution = _solve(program, point, FINE if last else COARSE, f"stage {k + 1} of {len(stages)}", progress)
         point, iterations = solution.point, iterations + solution.iterations
     assert solution is not None
-    return replace(solution, iterations=iterations)
+    return Fitted(replace(solution, iterations=iterations), program)

@@ -122,6 +122,15 @@ def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem
     return longest
 
 
+def slowest_period(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
+    """Return the period, s, of the slowest oscillation at the guesses; infinite where nothing oscillates."""
+    use = problem.train[0]
+    typical = [_typical(use, name) for name in drive.input_names]
+    frequencies = np.abs(_rates(drive, space.numbers(space.guess, use.name), typical).imag)
+    oscillating = frequencies[frequencies > 1e-3]
+    return float(2.0 * np.pi / np.min(oscillating)) if oscillating.size else np.inf
+
+
 def _typical(use: RecordingUse, name: str) -> float:
     channel = use.recording.channels.get(name)
     return float(np.nanquantile(channel.values, 0.75)) if channel is not None else 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.recording.recording import Recording
@@ -65,6 +65,10 @@ class Problem:
     question: str = ""
     """The comment at the head of the problem file: what is asked and what is known."""
     path: Path | None = None
+    diagnosis: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Section `diagnosis` of the file: effects, exclude, significance, as far as stated."""
+    limits: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Section `limits` of the file: speed, torque, travel, as far as stated."""
 
     @property
     def recordings(self) -> tuple[RecordingUse, ...]:

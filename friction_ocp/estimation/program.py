@@ -95,9 +95,9 @@ class Program:
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement."""
         pairs = zip(self.experiments, self.segments, strict=True)
-        return tuple(self._measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
+        return tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
 
-    def _measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
+    def measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""
         numbers, slope = self.space.numbers_and_slope(theta, item.name)
         many = self.sweep.start.map(len(nodes))
@@ -113,7 +113,7 @@ class Program:
         nodes = point.nodes[index]
         if cut.measured:
             nodes = nodes.copy()
-            nodes[: cut.measured] = self._measured_states(item, point.theta, cut.first[: cut.measured])[0]
+            nodes[: cut.measured] = self.measured_states(item, point.theta, cut.first[: cut.measured])[0]
         numbers = self.space.numbers(point.theta, item.name)
         return self.sweep.run(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
 
@@ -142,7 +142,7 @@ class Program:
         weight = self.segments[index].start_weight
         if weight is None:
             return 0.0
-        suggested, _ = self._measured_states(self.experiments[index], point.theta, self.segments[index].first[:1])
+        suggested, _ = self.measured_states(self.experiments[index], point.theta, self.segments[index].first[:1])
         return 0.5 * float(np.sum((weight * (point.nodes[index][0] - suggested[0])) ** 2))
 
     def linearise(self, point: Point) -> Linearisation:
@@ -215,11 +215,11 @@ class Program:
     def _add_start(self, index: int, point: Point, system: _System) -> None:
         cut, item = self.segments[index], self.experiments[index]
         if cut.measured:
-            _, slopes = self._measured_states(item, point.theta, cut.first[: cut.measured])
+            _, slopes = self.measured_states(item, point.theta, cut.first[: cut.measured])
             for j, slope in enumerate(slopes):
                 system.fold_node(j, slope)
         elif cut.start_weight is not None:
-            suggested, slopes = self._measured_states(item, point.theta, cut.first[:1])
+            suggested, slopes = self.measured_states(item, point.theta, cut.first[:1])
             weight = np.diag(cut.start_weight)
             error = cut.start_weight * (point.nodes[index][0] - suggested[0])
             system.cost += 0.5 * float(error @ error)

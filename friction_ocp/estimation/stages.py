@@ -29,17 +29,21 @@ class Stage:
     program: Program
 
 
-def program_of(model: Model, segments: tuple[Segments, ...], width: float, loss: AbstractLoss) -> Program:
-    """Return the program of the training recordings cut into `segments`."""
-    scale = model.speed_scale.copy()
+Experiments = tuple[Experiment, ...]
+
+
+def program_of(
+    model: Model, experiments: Experiments, segments: tuple[Segments, ...], width: float, loss: AbstractLoss
+) -> Program:
+    """Return the program of some recordings cut into `segments`."""
     return Program(
         space=model.space,
         drive=model.drive,
         sweep=model.sweep,
-        experiments=model.train,
+        experiments=experiments,
         segments=segments,
         noise=model.noise,
-        width=width * scale,
+        width=width * model.speed_scale,
         loss=loss,
     )
 
@@ -51,31 +55,28 @@ def cuts(experiment: Experiment, samples: int) -> IntArray:
     return np.unique(np.round(np.linspace(0, last, count + 1)).astype(np.int64))
 
 
-def predictions(model: Model, width: float) -> Program:
+def predictions(model: Model, experiments: Experiments, width: float) -> Program:
     """Return short predictions from the smoothed motion: nearly linear in the parameters, right from any start."""
-    segments = [cuts(item, PREDICTION_SAMPLES) for item in model.train]
+    segments = [cuts(item, PREDICTION_SAMPLES) for item in experiments]
     held = tuple(Segments(first, None, measured=len(first) - 1) for first in segments)
-    return program_of(model, held, width, Squares())
+    return program_of(model, experiments, held, width, Squares())
 
 
-def relaxed(model: Model, width: float, loss: AbstractLoss) -> Program:
+def relaxed(model: Model, experiments: Experiments, width: float, loss: AbstractLoss) -> Program:
     """Return segments joined by process noise."""
-    options = model.problem.estimation
     segments: list[Segments] = []
-    for item in model.train:
-        first = cuts(item, options.segment)
-        weights = gap_weights(model, item, first)
-        segments.append(_with_start(model, Segments(first, weights)))
-    return program_of(model, tuple(segments), width, loss)
+    for item in experiments:
+        first = cuts(item, model.problem.estimation.segment)
+        segments.append(_with_start(model, Segments(first, gap_weights(model, item, first))))
+    return program_of(model, experiments, tuple(segments), width, loss)
 
 
-def free_run(model: Model, width: float, loss: AbstractLoss, horizon: float | None) -> Program:
+def free_run(
+    model: Model, experiments: Experiments, width: float, loss: AbstractLoss, horizon: float | None
+) -> Program:
     """Return the free run over whole recordings, or over windows of `horizon` s that each start afresh."""
-    segments: list[Segments] = []
-    for item in model.train:
-        first = windows(item, horizon)
-        segments.append(_with_start(model, Segments(first, None)))
-    return program_of(model, tuple(segments), width, loss)
+    segments = tuple(_with_start(model, Segments(windows(item, horizon), None)) for item in experiments)
+    return program_of(model, experiments, segments, width, loss)
 
 
 def windows(item: Experiment, horizon: float | None) -> IntArray:

@@ -40,6 +40,8 @@ def correlation_figure(correlation: Mapping[str, Any]) -> Figure:
     if count <= _WRITTEN_UP_TO:
         for (row, column), value in np.ndenumerate(matrix):
             if np.isfinite(value):
-                dark = "white" if abs(value) > 0.75 else INK
-                axes.text(column, row, f"{value:.2f}".replace("-", "−"), ha="center", va="center", fontsize=8, color=dark)
+                dark = "white" if abs(value) > 0.85 else INK
+                axes.text(
+                    column, row, f"{value:.2f}".replace("-", "−"), ha="center", va="center", fontsize=8, color=dark
+                )
     return figure

@@ -15,7 +15,7 @@ SEQUENCE = ("#0072b2", "#d55e00", "#009e73", "#b0508a", "#a87800", "#2f9fd8", "#
 """Curves of one plot, in order; Okabe & Ito 2008, yellow and pink darkened for thin lines on white."""
 
 NEGATIVE = "#0072b2"
-POSITIVE = "#d55e00"
+POSITIVE = "#b84a00"
 """Ends of a diverging scale about white."""
 
 VERDICTS: Mapping[str, str] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from friction_ocp.plots.palette import MUTED, RESIDUAL, SIMULATED
+from friction_ocp.plots.palette import MUTED, RESIDUAL, VERDICTS
 from friction_ocp.plots.style import WIDTH, axes_grid, new_figure
 
 if TYPE_CHECKING:
@@ -41,4 +41,4 @@ def _draw(axes: Axes, residual: Residual) -> None:
     axes.set_ylim(-1.05, 1.05)
     white = bool(residual.get("white"))
     at: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 9}
-    axes.text(0.99, 0.97, "white" if white else "not white", color=MUTED if white else SIMULATED, **at)
+    axes.text(0.99, 0.97, "white" if white else "not white", color=VERDICTS["ok" if white else "at_bound"], **at)

@@ -118,6 +118,9 @@ def _recordings(result: Mapping[str, Any], series: Series) -> list[EmbeddedRecor
 
 
 def _fact(value: Any) -> str:
+    if isinstance(value, Mapping):
+        items: Mapping[Any, Any] = value
+        return ", ".join(f"{key} {_fact(item)}" for key, item in items.items())
     return plain(value) if isinstance(value, float) else str(value)
 
 

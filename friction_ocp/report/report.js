@@ -11,6 +11,7 @@
   const config = {
     responsive: true,
     displaylogo: false,
+    showSendToCloud: false,
     plotlyServerURL: "",
     // Named one by one: plotly's own set has a button that sends the data to its makers.
     modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
@@ -26,6 +27,8 @@
     exponentformat: "power",
     ...more,
   });
+  // On a phone the legend has its own row below the buttons.
+  const underButtons = () => ({ l: 56, r: 8, t: narrow() ? 60 : 34, b: 42 });
   const layout = (more) => ({
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("ink") },
     paper_bgcolor: "rgba(0,0,0,0)",
@@ -40,9 +43,21 @@
     ...more,
   });
 
+  // Gives a plot the colours of the page as they are now, and keeps its zoom; `meta` names a curve's colour.
+  function repaint(plot, size) {
+    const strokes = plot.data.map((trace) => colour(trace.meta));
+    const look = { "font.color": colour("ink"), "hoverlabel.bgcolor": colour("raised"),
+      "hoverlabel.bordercolor": colour("line"), "hoverlabel.font.color": colour("ink"), ...size };
+    Object.keys(plot.layout).filter((key) => /^[xy]axis/.test(key)).forEach((key) => {
+      look[key + ".gridcolor"] = colour("grid");
+      look[key + ".linecolor"] = look[key + ".zerolinecolor"] = colour("line");
+    });
+    return Plotly.update(plot, { "line.color": strokes, fillcolor: strokes }, look);
+  }
+
   function tracesFigure(channel) {
     const line = (name, y, stroke, width, more) => ({
-      type: "scatter", mode: "lines", name, x: channel.time, y, line: { color: colour(stroke), width },
+      type: "scatter", mode: "lines", name, x: channel.time, y, meta: stroke, line: { color: colour(stroke), width },
       hovertemplate: "%{y:.6~g}" + (channel.unit ? " " + literal(channel.unit) : ""), ...more,
     });
     const thinned = channel.shown < channel.samples;
@@ -56,10 +71,11 @@
       data: [
         line("measured", channel.measured, "measured", 2),
         line("simulated", channel.simulated, "simulated", 1.3),
-        line("residual", channel.residual, "residual", 1, { yaxis: "y2" }),
+        line("residual", channel.residual, "residual", 1, { yaxis: "y2", showlegend: false }),
       ],
       layout: {
         hoversubplots: "axis",
+        margin: underButtons(),
         xaxis: axis("time in s", { anchor: "y2", zeroline: false }),
         yaxis: axis("value" + within(channel.unit), { domain: [0.37, 1] }),
         yaxis2: axis("residual" + within(channel.unit), { domain: [0, 0.29] }),
@@ -69,8 +85,9 @@
 
   function frictionFigure(plot) {
     const data = plot.curves.flatMap((curve, index) => {
-      const stroke = colour("curve-" + (index % 7));
-      const shared = { type: "scatter", mode: "lines", legendgroup: String(index) };
+      const meta = "curve-" + (index % 7);
+      const stroke = colour(meta);
+      const shared = { type: "scatter", mode: "lines", legendgroup: String(index), meta };
       const band = {
         ...shared, x: curve.speed.concat(curve.speed.slice().reverse()),
         y: curve.upper.concat(curve.lower.slice().reverse()), fill: "toself", fillcolor: stroke, opacity: 0.2,
@@ -89,6 +106,7 @@
       data,
       layout: {
         showlegend: plot.curves.length > 1,
+        margin: underButtons(),
         xaxis: axis("speed" + within(plot.speed_unit)),
         yaxis: axis("friction torque" + within(plot.torque_unit)),
       },
@@ -106,7 +124,7 @@
       height: 290,
       data: [{
         type: "scatter", mode: "lines", name: "autocorrelation", x: residual.lag, y: residual.autocorrelation,
-        line: { color: colour("residual"), width: 1.6 }, hovertemplate: "%{y:.3f}",
+        meta: "residual", line: { color: colour("residual"), width: 1.6 }, hovertemplate: "%{y:.3f}",
       }],
       layout: {
         shapes: band,
@@ -218,17 +236,13 @@
   const onPaper = (printing) => {
     root.classList.toggle("printing", printing);
     document.querySelectorAll("details").forEach((details) => { details.open = printing; });
-    const theme = {
-      "font.color": colour("ink"), "xaxis.gridcolor": colour("grid"), "yaxis.gridcolor": colour("grid"),
-      width: printing ? 680 : undefined, autosize: !printing,
-    };
-    document.querySelectorAll(".plot").forEach((plot) => {
-      const paired = plot.closest(".pairs") && printing;
-      Plotly.relayout(plot, { ...theme, width: paired ? 325 : theme.width });
-    });
+    document.querySelectorAll(".plot").forEach((plot) => repaint(plot, printing
+      ? { width: plot.closest(".pairs") ? 325 : 680 }
+      : { width: null, autosize: true }));
   };
   window.addEventListener("beforeprint", () => onPaper(true));
   window.addEventListener("afterprint", () => onPaper(false));
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", showAll);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () =>
+    document.querySelectorAll(".plot").forEach((plot) => repaint(plot, {})));
   showAll();
 })();

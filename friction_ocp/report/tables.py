@@ -155,4 +155,4 @@ def _correlation_cell(value: Any) -> CorrelationCell:
         return CorrelationCell(NOTHING, "transparent", strong=False)
     strength = min(1.0, abs(value))
     base = POSITIVE if value > 0 else NEGATIVE
-    return CorrelationCell(f"{value:.2f}".replace("-", "−"), f"{base}{round(255 * strength):02x}", strength > 0.75)
+    return CorrelationCell(f"{value:.2f}".replace("-", "−"), f"{base}{round(255 * strength):02x}", strength > 0.85)

@@ -24,21 +24,40 @@ from friction_ocp.drive.stepping import SteppedDrive
 FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno", "-fwrapv")
 
 
+def value_functions(drive: SteppedDrive) -> dict[str, ca.Function]:
+    """Return `fo_step`, `fo_output` and `fo_tick`, each giving its dense value alone."""
+    return {f"fo_{name}": _value(f"fo_{name}", function) for name, function in _functions(drive).items()}
+
+
 def derivative_functions(drive: SteppedDrive, active: Sequence[int]) -> dict[str, ca.Function]:
-    """Return step, output and tick, each with its dense Jacobians by the state and the active parameters."""
+    """Return `fo_step_d`, ...: value and dense Jacobians by the state and the active parameters."""
+    return {
+        f"fo_{name}_d": _with_jacobians(f"fo_{name}_d", function, active)
+        for name, function in _functions(drive).items()
+    }
+
+
+def _functions(drive: SteppedDrive) -> dict[str, ca.Function]:
     functions = {"step": drive.step, "output": drive.output}
-    if drive.tick is not None:
-        functions["tick"] = drive.tick
-    return {name: _with_jacobians(name, function, active) for name, function in functions.items()}
+    return functions if drive.tick is None else functions | {"tick": drive.tick}
+
+
+def _symbols(function: ca.Function) -> list[ca.SX]:
+    return [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]  # pyright: ignore[reportArgumentType]
+
+
+def _value(name: str, function: ca.Function) -> ca.Function:
+    arguments = _symbols(function)
+    return ca.Function(name, arguments, [ca.densify(function.call(arguments, True, False)[0])], {"cse": True})
 
 
 def _with_jacobians(name: str, function: ca.Function, active: Sequence[int]) -> ca.Function:
-    arguments = [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]  # pyright: ignore[reportArgumentType]
+    arguments = _symbols(function)
     value = function.call(arguments, True, False)[0]
     chosen = ca.vertcat(*[arguments[2][k] for k in active]) if active else ca.SX(0, 1)
     by_state = ca.densify(ca.jacobian(value, arguments[0]))
     by_parameter = ca.densify(ca.jacobian(value, chosen)) if active else ca.SX(value.numel(), 0)
-    return ca.Function(f"fo_{name}", arguments, [ca.densify(value), by_state, by_parameter], {"cse": True})
+    return ca.Function(name, arguments, [ca.densify(value), by_state, by_parameter], {"cse": True})
 
 
 def compiler() -> str | None:
@@ -89,7 +108,7 @@ def _built(source: str, program: str, key: str) -> Path:
 
 
 def _source(drive: SteppedDrive, active: Sequence[int]) -> str:
-    functions = derivative_functions(drive, active)
+    functions = value_functions(drive) | derivative_functions(drive, active)
     generator = ca.CodeGenerator("generated.c", {"with_header": False, "indent": 0})
     for function in functions.values():
         generator.add(function)
@@ -100,20 +119,19 @@ def _source(drive: SteppedDrive, active: Sequence[int]) -> str:
         "NA": len(active),
         "NY": len(drive.output_names),
     }
-    for short, name in (("STEP", "step"), ("OUT", "output"), ("TICK", "tick")):
-        if name in functions:
-            sizes |= _work_sizes(short, functions[name])
+    sizes |= _work_sizes(list(functions.values()))
     defines = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
-    if "tick" in functions:
+    if drive.tick is not None:
         defines += "#define HAS_TICK\n"
     export = "#include <string.h>\n#define SWEEP_EXPORT __attribute__((visibility(\"default\")))\n"
     return generator.dump() + export + defines + files("friction_ocp.simulation").joinpath("sweep.c").read_text()
 
 
-def _work_sizes(short: str, function: ca.Function) -> dict[str, int]:
+def _work_sizes(functions: Sequence[ca.Function]) -> dict[str, int]:
+    """Return the work space that suffices for every function."""
     return {
-        f"{short}_ARG": function.sz_arg(),
-        f"{short}_RES": function.sz_res(),
-        f"{short}_IW": function.sz_iw(),
-        f"{short}_W": function.sz_w(),
+        "SZ_ARG": max(function.sz_arg() for function in functions),
+        "SZ_RES": max(function.sz_res() for function in functions),
+        "SZ_IW": max(function.sz_iw() for function in functions) + 1,
+        "SZ_W": max(function.sz_w() for function in functions) + 1,
     }

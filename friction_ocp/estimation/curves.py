@@ -1,0 +1,114 @@
+"""Friction torque over speed and load with its confidence band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from friction_ocp.drive.kick import transmitted_torque
+from friction_ocp.drive.mechanism import Mechanism, Motion
+from friction_ocp.drive.parts import Shaft
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.score import FreeRun
+from friction_ocp.friction.smoothing import smooth_abs
+from friction_ocp.friction.static import NoFriction
+from friction_ocp.simulation.grid import FloatArray
+
+POINTS = 201
+REACH = 1.96
+
+
+@dataclass(frozen=True)
+class FrictionCurve:
+    """Steady-state friction torque of a shaft under one load."""
+
+    shaft: str
+    law: str
+    load: float
+    """Transmitted torque, N m (N)."""
+    speed: FloatArray
+    torque: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+def friction_curves(
+    model: Model, theta: FloatArray, covariance: FloatArray, runs: tuple[FreeRun, ...]
+) -> tuple[FrictionCurve, ...]:
+    """Return the friction of every shaft over the speeds that the recordings reach, with 95 % bands."""
+    mech = model.drive.mechanism
+    curves: list[FrictionCurve] = []
+    for shaft in mech.drive.shafts:
+        if isinstance(shaft.friction.law, NoFriction):
+            continue
+        fastest = _fastest(mech, shaft.name, runs)
+        for load in _loads(model, shaft, theta, runs):
+            curves.append(_curve(model, shaft, theta, covariance, fastest, load))
+    return tuple(curves)
+
+
+def _fastest(mech: Mechanism, name: str, runs: tuple[FreeRun, ...]) -> float:
+    group = mech.topology.group_of[name]
+    if group not in mech.free_groups or not runs:
+        return 1.0
+    column = len(mech.angle_groups) + mech.free_groups.index(group)
+    speed = max(float(np.max(np.abs(run.states[:, column]))) for run in runs)
+    ratio = mech.topology.speed_ratio[name]
+    return speed * (1.0 if isinstance(ratio, ca.SX) else abs(float(ratio)))
+
+
+def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, ...]) -> list[float]:
+    """Return loads at which to show load-dependent friction: none, half and all of what gravity or springs give."""
+    if shaft.friction.load is None or not runs:
+        return [0.0]
+    mech = model.drive.mechanism
+    q = ca.SX.sym("q", len(mech.topology.roots))  # pyright: ignore[reportArgumentType]
+    at = Motion(q, ca.SX.zeros(q.numel()), ca.SX.zeros(8), ca.SX.zeros(16))
+    joint = mech.load_joint(shaft)
+    if joint.rigid:
+        beyond = mech.topology.beyond(joint)
+        torque = sum(_gravity(mech, name, at) * mech.topology.speed_ratio[name] for name in beyond)
+        torque = torque / mech.topology.speed_ratio[joint.to_shaft]
+    else:
+        torque = mech.elastic_torque(joint, at, 0.0)
+    size = transmitted_torque(mech, shaft, {joint.name: ca.SX(torque)})
+    inputs = ca.vertcat(*mech.inputs.values())
+    function = ca.Function("load", [q, inputs, ca.vertcat(*mech.parameters.values())], [size])
+    largest = 0.0
+    for run, item in zip(runs, model.train, strict=False):
+        if len(mech.angle_groups) == q.numel():
+            numbers = model.space.numbers(theta, run.name)
+            sizes = function.map(run.time.size)(run.states[:, : q.numel()].T, item.grid.at_node.T, numbers)
+            largest = max(largest, float(np.quantile(np.asarray(sizes), 0.95)))
+    return [0.0, 0.5 * largest, largest] if largest > 0 else [0.0]
+
+
+def _gravity(mech: Mechanism, name: str, at: Motion) -> ca.SX:
+    gravity = mech.drive.shaft(name).gravity
+    return ca.SX(0.0) if gravity is None else gravity.torque * ca.sin(mech.shaft_angle(name, at) + gravity.phase)
+
+
+def _curve(
+    model: Model, shaft: Shaft, theta: FloatArray, covariance: FloatArray, fastest: float, load: float
+) -> FrictionCurve:
+    omega = ca.SX.sym("omega")  # pyright: ignore[reportArgumentType]
+    parameters = ca.vertcat(*model.drive.mechanism.parameters.values())
+    element = shaft.friction
+    speed, (positive, negative) = (
+        smooth_abs(omega),
+        (element.magnitude(side, smooth_abs(omega), load) for side in ("positive", "negative")),
+    )
+    torque = ca.if_else(omega >= 0, positive, -negative)
+    del speed
+    active = ca.vertcat(*[parameters[k] for k in model.space.active])
+    function = ca.Function("curve", [omega, parameters], [torque, ca.densify(ca.jacobian(torque, active))])
+    grid = np.linspace(-fastest, fastest, POINTS + 1)
+    numbers, slope = model.space.numbers_and_slope(theta, model.train[0].name)
+    values, by_active = function.map(grid.size)(grid[None, :], numbers)
+    by_theta = np.asarray(by_active).reshape(grid.size, -1) @ slope
+    known = np.nan_to_num(covariance)
+    reach = REACH * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by_theta, known, by_theta), 0.0))
+    values = np.asarray(values).ravel()
+    return FrictionCurve(shaft.name, element.law.name, load, grid, values, values - reach, values + reach)

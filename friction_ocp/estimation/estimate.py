@@ -1,0 +1,190 @@
+"""Identification on one page: problem -> model -> fit -> uncertainty -> free run -> estimate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.drive.units import signal_unit, unit_of
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.estimation.curves import FrictionCurve, friction_curves
+from friction_ocp.estimation.fit import Fitted, Progress, fit, silent
+from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.identifiability import Verdict, verdicts
+from friction_ocp.estimation.influence import influence
+from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.noise import NoiseFloor
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
+from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
+from friction_ocp.estimation.warnings import warnings_of
+from friction_ocp.estimation.whiteness import Whiteness, whiteness
+from friction_ocp.simulation.grid import FloatArray
+
+ChannelErrors = Mapping[str, tuple[Errors, Mapping[str, Errors]]]
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One fitted parameter."""
+
+    name: str
+    value: float
+    unit: str
+    std_error: float
+    interval95: tuple[float, float]
+    guess: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class SolverFacts:
+    """What the solver did."""
+
+    name: str
+    iterations: int
+    seconds: float
+    build_seconds: float
+    objective: float
+    starts: int
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Free runs of a problem and their errors; also the part of an `Estimate` that a reader can check by eye."""
+
+    problem: Problem
+    train: tuple[FreeRun, ...]
+    validation: tuple[FreeRun, ...]
+    train_errors: ChannelErrors
+    validation_errors: ChannelErrors
+    floors: Mapping[str, NoiseFloor]
+    units: Mapping[str, str]
+    """By output channel."""
+    state_names: tuple[str, ...]
+    horizon_s: float | None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The answer of an identification."""
+
+    problem: Problem
+    converged: bool
+    message: str
+    parameters: tuple[ParameterEstimate, ...]
+    uncertainty: Uncertainty
+    simulation: Simulation
+    residuals: Mapping[str, Mapping[str, Whiteness]]
+    """By recording and channel."""
+    curves: tuple[FrictionCurve, ...]
+    warnings: tuple[str, ...]
+    solver: SolverFacts
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Value by parameter name."""
+        return {item.name: item.value for item in self.parameters}
+
+
+def identify(problem: Problem, progress: Progress = silent) -> Estimate:
+    """Fit every parameter of a problem that has a guess.
+
+    Raises FrictionOcpError where the recordings do not fit the drive. A fit that did not converge is returned with
+    `converged` False and says why in `message`.
+    """
+    began = time.perf_counter()
+    model = prepare(problem)
+    built = time.perf_counter()
+    fitted = fit(model, progress)
+    seconds = time.perf_counter() - built
+    return conclude(model, fitted, built - began, seconds)
+
+
+def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float) -> Estimate:
+    """Turn a fit into an estimate: covariance, verdicts, free runs, warnings."""
+    problem, solution = model.problem, fitted.solution
+    theta = solution.point.theta
+    found = influence(fitted.program, solution.point)
+    residuals = _residual_tests(fitted)
+    white = all(test.white for tests in residuals.values() for test in tests.values())
+    doubt = uncertainty(model.space, theta, found, white, problem.estimation.loss == "absolute")
+    simulation = simulate_model(model, theta)
+    parameters = _parameter_estimates(model, theta, doubt, verdicts(model.space, theta, doubt))
+    return Estimate(
+        problem=problem,
+        converged=solution.converged,
+        message=solution.message,
+        parameters=parameters,
+        uncertainty=doubt,
+        simulation=simulation,
+        residuals=residuals,
+        curves=friction_curves(model, theta, doubt.covariance, simulation.train),
+        warnings=warnings_of(solution, parameters, doubt, residuals, simulation),
+        solver=SolverFacts(
+            problem.estimation.solver,
+            solution.iterations,
+            seconds,
+            build_seconds,
+            solution.objective,
+            problem.estimation.starts,
+        ),
+    )
+
+
+def simulate(problem: Problem) -> Simulation:
+    """Simulate all recordings freely with the guesses of a problem."""
+    model = prepare(problem)
+    return simulate_model(model, model.space.guess)
+
+
+def simulate_model(model: Model, theta: FloatArray) -> Simulation:
+    """Simulate all recordings freely with given parameters."""
+    train = simulate_recordings(model, model.train, theta)
+    validation = simulate_recordings(model, model.validation, theta)
+    return Simulation(
+        problem=model.problem,
+        train=train,
+        validation=validation,
+        train_errors=channel_errors(model, train),
+        validation_errors=channel_errors(model, validation),
+        floors=model.floors,
+        units={item.name: signal_unit(model.problem.drive, item.measures) for item in model.problem.drive.outputs},
+        state_names=model.drive.state_names,
+        horizon_s=horizon(model),
+    )
+
+
+def _parameter_estimates(
+    model: Model, theta: FloatArray, doubt: Uncertainty, judged: tuple[Verdict, ...]
+) -> tuple[ParameterEstimate, ...]:
+    units = {leaf.path: unit_of(leaf, model.problem.drive) for leaf in drive_leaves(model.problem.drive)}
+    intervals = doubt.interval(theta)
+    return tuple(
+        ParameterEstimate(
+            name=name,
+            value=float(theta[k]),
+            unit=units[name.partition("@")[0]],
+            std_error=float(doubt.std_error[k]),
+            interval95=(float(intervals[k, 0]), float(intervals[k, 1])),
+            guess=float(model.space.guess[k]),
+            verdict=judged[k],
+        )
+        for k, name in enumerate(model.space.names)
+    )
+
+
+def _residual_tests(fitted: Fitted) -> dict[str, dict[str, Whiteness]]:
+    program, point = fitted.program, fitted.solution.point
+    tests: dict[str, dict[str, Whiteness]] = {}
+    for index, item in enumerate(program.experiments):
+        residuals = program.residuals(index, program.simulate(index, point).y)
+        tests[item.name] = {}
+        for column, name in enumerate(program.drive.output_names):
+            seen = np.isfinite(residuals[:, column])
+            if seen.sum() > 10:
+                tests[item.name][name] = whiteness(item.grid.time[seen], residuals[seen, column])
+    return tests

@@ -1,0 +1,44 @@
+"""Over what time a free run is judged: a drive that nothing holds drifts by nature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.estimation.model import Model, slowest_period
+
+LONGEST_WINDOW = 10.0
+PERIODS = 10.0
+
+
+def horizon(model: Model) -> float | None:
+    """Return the length, s, of the windows over which a free run is judged; None is the whole recording.
+
+    The whole recording where a controller closes the loop or gravity, a spring or a prescribed motion holds the
+    drive; else 10 s or ten slowest periods, whichever is shorter.
+    """
+    stated = model.problem.estimation.horizon_s
+    if stated is not None:
+        return stated
+    if is_held(model.problem.drive):
+        return None
+    return min(LONGEST_WINDOW, PERIODS * slowest_period(model.drive, model.space, model.problem))
+
+
+def fits_free_run(model: Model) -> bool:
+    """Whether the fit minimises the error of the free run rather than that of relaxed segments."""
+    chosen = model.problem.estimation.fit
+    return chosen == "simulation" if chosen else horizon(model) is None
+
+
+def is_held(drive: Drive) -> bool:
+    """Whether every shaft is tied, through transmissions, to something that keeps it from drifting."""
+    held = {shaft.name for shaft in drive.shafts if shaft.gravity is not None}
+    held |= {channel.part for channel in drive.inputs if channel.signal in ("theta", "omega")}
+    if drive.controller is not None:
+        held |= {motor.shaft for motor in drive.motors}
+    for _ in drive.transmissions:
+        for item in drive.transmissions:
+            if held & {item.from_shaft, item.to_shaft}:
+                held |= {item.from_shaft, item.to_shaft}
+    return bool(np.all([shaft.name in held for shaft in drive.shafts]))

@@ -1,0 +1,75 @@
+"""A verdict for every parameter: trusted, at a bound, not identifiable, or traded with others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.estimation.uncertainty import Uncertainty
+from friction_ocp.simulation.grid import FloatArray
+
+CONDITION_INDEX = 30.0
+VARIANCE_SHARE = 0.5
+"""Thresholds of Belsley, Kuh & Welsch 1980 for a harmful near-dependency."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the data say about one parameter."""
+
+    word: str
+    """ok, at_bound, not_identifiable or traded."""
+    traded_with: tuple[str, ...] = ()
+
+
+def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tuple[Verdict, ...]:
+    """Judge every parameter."""
+    unseen = _unseen(space, theta, found)
+    partners = _partners(found, ~(found.at_bound | unseen))
+    result: list[Verdict] = []
+    for k in range(theta.size):
+        if found.at_bound[k]:
+            result.append(Verdict("at_bound"))
+        elif unseen[k]:
+            result.append(Verdict("not_identifiable"))
+        elif partners[k]:
+            result.append(Verdict("traded", tuple(space.names[j] for j in partners[k])))
+        else:
+            result.append(Verdict("ok"))
+    return tuple(result)
+
+
+def _unseen(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> FloatArray:
+    """Return which parameters the data do not see even with all others known.
+
+    Their conditional standard error exceeds their own size and half of their bounds: nothing is excluded.
+    """
+    prior = np.where(np.isfinite(space.prior_std), space.prior_std, np.inf) ** -2.0
+    own = np.maximum(np.diag(found.information) - prior, 0.0)
+    conditional = 1.0 / np.sqrt(np.maximum(own, 1e-300))
+    span = space.upper - space.lower
+    size = np.where(np.isfinite(span), 0.5 * span, 0.0)
+    return (conditional > np.maximum(np.abs(theta), space.scale)) & (conditional > size)
+
+
+def _partners(found: Uncertainty, free: FloatArray) -> list[list[int]]:
+    """Return for each parameter those with which it shares a near-dependency of the information matrix."""
+    count = found.information.shape[0]
+    partners: list[set[int]] = [set() for _ in range(count)]
+    index = np.flatnonzero(free)
+    if index.size < 2:
+        return [[] for _ in range(count)]
+    information = found.information[np.ix_(index, index)]
+    size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    values = np.maximum(values, 1e-14)
+    shares = (vectors**2 / values) / np.sum(vectors**2 / values, axis=1, keepdims=True)
+    for k, value in enumerate(values):
+        if np.sqrt(values[-1] / value) <= CONDITION_INDEX:
+            continue
+        together = index[shares[:, k] > VARIANCE_SHARE]
+        for one in together:
+            partners[one].update(int(other) for other in together if other != one)
+    return [sorted(group) for group in partners]

@@ -1,0 +1,80 @@
+"""How every residual pulls on the fitted parameters, with the node states solved for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Effective Jacobian rows of all measured samples and gaps, prior rows apart."""
+
+    jacobian: FloatArray
+    """(rows, parameters): derivative of each scaled residual along the manifold of solved nodes."""
+    residual: FloatArray
+    """(rows,) in units of the noise floor."""
+    score_weight: FloatArray
+    """(rows,) rho'(r)."""
+    curvature: FloatArray
+    """(rows,) the weight of each row in the information matrix."""
+    recording: IntArray
+    """(rows,) index of the recording."""
+    time: FloatArray
+    """(rows,) s."""
+    prior: FloatArray
+    """(parameters, parameters) information from priors."""
+
+    @property
+    def information(self) -> FloatArray:
+        """Return the Gauss-Newton Hessian, priors included."""
+        return self.jacobian.T @ (self.curvature[:, None] * self.jacobian) + self.prior
+
+
+def influence(program: Program, point: Point) -> Influence:
+    """Return the influence of every residual at a solution."""
+    reduced = reduce_system(program.linearise(point), 0.0)
+    parts = [
+        _of_recording(program, point, index, reduced.recordings[index].by_theta)
+        for index in range(len(program.experiments))
+    ]
+    jacobian, residual, weight, curvature, time = (np.concatenate(column) for column in zip(*parts, strict=True))
+    recording = np.concatenate([np.full(part[1].size, index) for index, part in enumerate(parts)])
+    pull = np.where(np.isfinite(program.space.prior_std), program.space.prior_std, np.inf) ** -2.0
+    return Influence(jacobian, residual, weight, curvature, recording, time, np.diag(pull))
+
+
+def _of_recording(
+    program: Program, point: Point, index: int, by_theta: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    item, cut = program.experiments[index], program.segments[index]
+    result = program.simulate(index, point, derivatives=True)
+    assert result.dy is not None and result.dend is not None
+    _, slope = program.space.numbers_and_slope(point.theta, item.name)
+    states = point.nodes[index].shape[1]
+    nodes = np.concatenate([by_theta, np.zeros((0, *by_theta.shape[1:]))])
+    if cut.measured:
+        nodes = nodes.copy()
+        nodes[: cut.measured] = program.measured_states(item, point.theta, cut.first[: cut.measured])[1]
+    segment = np.clip(np.searchsorted(cut.first, np.arange(item.grid.time.size), side="right") - 1, 0, cut.count - 1)
+    full = np.einsum("noi,nip->nop", result.dy[:, :, :states], nodes[segment]) + result.dy[:, :, states:] @ slope
+    errors = program.residuals(index, result.y)
+    seen = np.isfinite(errors)
+    rows, residual = (full / program.noise[:, None])[seen], errors[seen]
+    time = np.broadcast_to(item.grid.time[:, None], errors.shape)[seen]
+    loss = program.loss
+    parts = [(rows, residual, loss.weight(residual) * residual, loss.curvature(residual), time)]
+    if cut.gap_weight is not None and cut.count > 1:
+        gap = np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - point.nodes[index][1:])
+        moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
+        moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
+        at = np.repeat(item.grid.time[cut.first[1:-1]], states)
+        flat = gap.ravel()
+        parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
+    order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")
+    return tuple(np.concatenate(column)[order] for column in zip(*parts, strict=True))  # pyright: ignore[reportReturnType]

@@ -1,0 +1,128 @@
+"""Free-running simulation of recordings and how far it is from what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.stages import free_run, relaxed
+from friction_ocp.simulation.grid import FloatArray
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """One recording simulated."""
+
+    name: str
+    time: FloatArray
+    """(n,) s."""
+    measured: FloatArray
+    """(n, outputs), NaN where there is no sample."""
+    simulated: FloatArray
+    """(n, outputs)."""
+    states: FloatArray
+    """(n, states)."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one channel over some recordings, in SI units of the channel."""
+
+    rms: float
+    mae: float
+    relative: float
+    """rms over the rms of the measured signal about its mean."""
+    relative_norm: float
+    """Norm of the error over the norm of the signal."""
+    noise_ratio: float
+
+
+def simulate_recordings(
+    model: Model, experiments: tuple[Experiment, ...], theta: FloatArray, width: float = 0.0
+) -> tuple[FreeRun, ...]:
+    """Simulate recordings freely with exact friction, over windows where the drive drifts."""
+    if not experiments:
+        return ()
+    span = horizon(model)
+    program = free_run(model, experiments, width, Squares(), span)
+    point = Point(theta, program.suggested_nodes(theta))
+    point = solve_nodes(program, point) if span is None else _smoothed(model, experiments, program, point)
+    runs: list[FreeRun] = []
+    for index, item in enumerate(experiments):
+        result = program.simulate(index, point, with_states=True)
+        assert result.states is not None
+        runs.append(FreeRun(item.name, item.grid.time, item.measured, result.y, result.states))
+    return tuple(runs)
+
+
+def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Program, point: Point) -> Point:
+    """Start every window from the state that the relaxed program smooths out of the measurement."""
+    smoother = relaxed(model, experiments, 0.0, Squares())
+    solved = solve_nodes(smoother, Point(point.theta, smoother.suggested_nodes(point.theta)))
+    nodes: list[FloatArray] = []
+    for index, cut in enumerate(smoother.segments):
+        track = smoother.simulate(index, solved, with_states=True).states
+        assert track is not None
+        nodes.append(track[program.segments[index].first[:-1]])
+        del cut
+    return replace(point, nodes=tuple(nodes))
+
+
+def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
+    """Solve for the node states with the parameters held."""
+    if all(cut.count == cut.measured for cut in program.segments):
+        return point
+    still = np.zeros_like(point.theta)
+    objective, damping = program.objective(point), 1e-6
+    for _ in range(iterations):
+        steps = reduce_system(program.linearise(point), damping).node_steps(still)
+        trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))
+        after = program.objective(trial)
+        if after < objective:
+            gained, point, objective = objective - after, trial, after
+            damping *= 0.1
+            if gained < 1e-9 * objective:
+                break
+        else:
+            damping *= 100.0
+    return point
+
+
+def errors_of(runs: tuple[FreeRun, ...], column: int, floor: float) -> Errors:
+    """Return the errors of one output over recordings."""
+    measured = np.concatenate([run.measured[:, column] for run in runs])
+    error = np.concatenate([run.simulated[:, column] for run in runs]) - measured
+    seen = np.isfinite(measured)
+    error, signal = error[seen], measured[seen]
+    rms = float(np.sqrt(np.mean(error**2)))
+    return Errors(
+        rms=rms,
+        mae=float(np.mean(np.abs(error))),
+        relative=rms / max(float(np.std(signal)), 1e-300),
+        relative_norm=float(np.linalg.norm(error)) / max(float(np.linalg.norm(signal)), 1e-300),
+        noise_ratio=rms / floor,
+    )
+
+
+def channel_errors(model: Model, runs: tuple[FreeRun, ...]) -> Mapping[str, tuple[Errors, Mapping[str, Errors]]]:
+    """Return for each output channel its errors over all recordings and by recording."""
+    table: dict[str, tuple[Errors, Mapping[str, Errors]]] = {}
+    for column, name in enumerate(model.drive.output_names):
+        if not runs:
+            continue
+        floor = model.floors[name].std
+        by_recording = {run.name: errors_of((run,), column, floor) for run in runs if _has_samples(run, column)}
+        table[name] = (errors_of(runs, column, floor), by_recording)
+    return table
+
+
+def _has_samples(run: FreeRun, column: int) -> bool:
+    return bool(np.any(np.isfinite(run.measured[:, column])))

@@ -1,0 +1,122 @@
+"""Covariance of the estimate: from the Gauss-Newton Hessian, or robust where residuals are not white."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
+
+from friction_ocp.estimation.influence import Influence
+from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.simulation.grid import FloatArray
+
+CONFIDENCE = 0.95
+MIN_BLOCKS, MAX_BLOCKS = 24, 200
+"""Blocks of residuals that the robust covariance is summed over: enough to average, long enough to be independent."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard errors of the parameters and how they were found."""
+
+    covariance: FloatArray
+    """(parameters, parameters); rows and columns of parameters at a bound are NaN."""
+    kind: str
+    """`gauss_newton` or `sandwich`."""
+    at_bound: FloatArray
+    """(parameters,) booleans."""
+    freedom: float
+    """Degrees of freedom of the t distribution behind the intervals."""
+    information: FloatArray
+    """(parameters, parameters) Gauss-Newton Hessian."""
+
+    @property
+    def std_error(self) -> FloatArray:
+        """(parameters,), NaN at a bound."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """(parameters, parameters)."""
+        return self.covariance / np.outer(self.std_error, self.std_error)
+
+    def interval(self, theta: FloatArray) -> FloatArray:
+        """Return (parameters, 2) intervals at 95 %."""
+        reach = float(_stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.freedom)) * self.std_error
+        return np.column_stack([theta - reach, theta + reach])
+
+
+def at_bounds(space: ParameterSpace, theta: FloatArray) -> FloatArray:
+    """Return which parameters lie on one of their bounds."""
+    span = np.where(np.isfinite(space.upper - space.lower), space.upper - space.lower, np.abs(theta) + 1.0)
+    return (theta - space.lower <= 1e-6 * span) | (space.upper - theta <= 1e-6 * span)
+
+
+def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, white: bool, absolute: bool) -> Uncertainty:
+    """Return the covariance on the parameters that are not at a bound.
+
+    With white residuals it is the inverse Hessian; otherwise, and for losses that are no likelihood of the noise,
+    the sandwich H^-1 B H^-1 with B summed over blocks of neighbouring residuals (Huber 1967, Hall 1985).
+    """
+    information = found.information
+    if absolute:
+        information = found.jacobian.T @ (_density_weight(found)[:, None] * found.jacobian) + found.prior
+    bound = at_bounds(space, theta)
+    free = ~bound
+    inverse = _inverse(information[np.ix_(free, free)])
+    covariance = np.full(information.shape, np.nan)
+    if white and not absolute:
+        covariance[np.ix_(free, free)] = inverse
+        return Uncertainty(covariance, "gauss_newton", bound, np.inf, information)
+    meat, blocks = _block_scores(found, free)
+    prior = found.prior[np.ix_(free, free)]
+    covariance[np.ix_(free, free)] = inverse @ (meat + prior) @ inverse
+    return Uncertainty(covariance, "sandwich", bound, float(blocks - 1), information)
+
+
+def _density_weight(found: Influence) -> FloatArray:
+    """Curvature of the absolute loss: twice the density of the residuals at zero (Silverman's bandwidth)."""
+    r = found.residual
+    spread = min(float(np.std(r)), float(np.subtract(*np.quantile(r, [0.75, 0.25]))) / 1.34)
+    width = 0.9 * spread * r.size**-0.2
+    density = float(np.mean(np.exp(-0.5 * (r / width) ** 2))) / (width * np.sqrt(2.0 * np.pi))
+    return np.full(r.size, 2.0 * density)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Invert a scaled information matrix; directions without information get a huge variance."""
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
+    values = np.maximum(values, 1e-14)
+    return (vectors / values) @ vectors.T / np.outer(size, size)
+
+
+def _block_scores(found: Influence, free: FloatArray) -> tuple[FloatArray, int]:
+    """Return the sum of outer products of block scores, corrected for the number of blocks, and that number."""
+    scores = found.jacobian[:, free] * found.score_weight[:, None]
+    recordings = np.unique(found.recording)
+    length = _correlation_rows(found)
+    blocks: list[FloatArray] = []
+    for index in recordings:
+        own = scores[found.recording == index]
+        wanted = int(np.clip(own.shape[0] / (4.0 * length), MIN_BLOCKS / recordings.size, MAX_BLOCKS))
+        blocks += [part.sum(axis=0) for part in np.array_split(own, max(wanted, 2))]
+    stacked = np.array(blocks)
+    count = stacked.shape[0]
+    centred = stacked - stacked.mean(axis=0)
+    return centred.T @ centred * count / (count - 1), count
+
+
+def _correlation_rows(found: Influence) -> float:
+    """Return the integrated autocorrelation length of the residuals, in rows (initial positive sequence)."""
+    lengths: list[float] = []
+    for index in np.unique(found.recording):
+        r = found.score_weight[found.recording == index]
+        r = r - r.mean()
+        power = np.abs(np.fft.rfft(r, 2 * r.size)) ** 2
+        rho = np.fft.irfft(power)[: r.size]
+        rho = rho / max(float(rho[0]), 1e-300)
+        stop = int(np.argmax(rho <= 0)) or r.size
+        lengths.append(1.0 + 2.0 * float(np.sum(rho[1:stop])))
+    return float(np.mean(lengths))

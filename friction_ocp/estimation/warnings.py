@@ -1,0 +1,90 @@
+"""What is wrong with an answer, in sentences that stand above it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from friction_ocp.estimation.gauss_newton import Solution
+from friction_ocp.estimation.identifiability import Verdict
+from friction_ocp.estimation.score import Errors
+from friction_ocp.estimation.uncertainty import Uncertainty
+from friction_ocp.estimation.whiteness import Whiteness
+
+VALIDATION_EXCESS = 1.5
+"""Validation error over training error from which a warning says that the fit does not carry over."""
+
+
+class NamedVerdict(Protocol):
+    """A parameter with its verdict."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def verdict(self) -> Verdict: ...
+
+
+class Scored(Protocol):
+    """Free-run errors on training and validation recordings."""
+
+    @property
+    def train_errors(self) -> Mapping[str, tuple[Errors, Mapping[str, Errors]]]: ...
+    @property
+    def validation_errors(self) -> Mapping[str, tuple[Errors, Mapping[str, Errors]]]: ...
+
+
+def warnings_of(
+    solution: Solution,
+    parameters: Sequence[NamedVerdict],
+    doubt: Uncertainty,
+    residuals: Mapping[str, Mapping[str, Whiteness]],
+    scored: Scored,
+) -> tuple[str, ...]:
+    """Return every reason to doubt the answer, the gravest first."""
+    texts: list[str] = []
+    if not solution.converged:
+        texts.append(f"The solver did not converge: {solution.message}. The values below are its last iterate.")
+    texts += [_parameter_warning(item) for item in parameters if item.verdict.word != "ok"]
+    texts += _misfit_warnings(doubt, residuals, scored)
+    return tuple(texts)
+
+
+def _parameter_warning(item: NamedVerdict) -> str:
+    shown = f"{item.name} = {item.value:.4g} {item.unit}"
+    match item.verdict.word:
+        case "at_bound":
+            return f"{shown} lies on its bound: widen the bound, or the model asks the parameter for something else."
+        case "not_identifiable":
+            return f"{shown}: the recordings do not tell this parameter; fix it, give a prior, or record what shows it."
+        case _:
+            return (
+                f"{shown} is traded with {', '.join(item.verdict.traded_with)}: only a combination of them is known; "
+                "fix one, give a prior, or record what tells them apart."
+            )
+
+
+def _misfit_warnings(
+    doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored
+) -> list[str]:
+    texts: list[str] = []
+    coloured = sum(not test.white for tests in residuals.values() for test in tests.values())
+    total = sum(len(tests) for tests in residuals.values())
+    if coloured:
+        texts.append(
+            f"Residuals are not white in {coloured} of {total} recorded channels: the model misses something, and the "
+            f"standard errors are the robust ({doubt.kind}) ones."
+        )
+    for name, (errors, _) in scored.validation_errors.items():
+        train = scored.train_errors[name][0]
+        if errors.rms > VALIDATION_EXCESS * train.rms:
+            texts.append(
+                f"{name}: the free run is {errors.rms / train.rms:.1f} times worse on validation than on training."
+            )
+    for name, (errors, _) in scored.train_errors.items():
+        if errors.noise_ratio > 2.0:
+            texts.append(f"{name}: the error of the free run is {errors.noise_ratio:.1f} times the noise floor.")
+    return texts

@@ -1,0 +1,66 @@
+"""Figures are written for whatever a result has."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_example import identified
+
+from friction_ocp.plots import write_figures
+from friction_ocp.plots.curves import curve_label
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Return the figures of the example."""
+    return write_figures(*identified(500), tmp_path_factory.mktemp("run") / "figures")
+
+
+def test_every_figure_is_written_as_png_and_svg(written: list[Path]) -> None:
+    """One pair a recording, a shaft and a table, none of them empty."""
+    stems = ["parameters", "traces-staircase", "traces-stop", "traces-reversals", "friction-motor", "friction-load"]
+    stems += ["residual-autocorrelation", "correlation"]
+    assert [path.name for path in written] == [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
+    for path in written:
+        content = path.read_bytes()
+        assert len(content) > 5000
+        if path.suffix == ".png":
+            assert content.startswith(b"\x89PNG")
+        else:
+            assert ElementTree.fromstring(content).tag.endswith("svg")
+
+
+def test_names_cannot_leave_the_folder_nor_meet_in_one_file(tmp_path: Path) -> None:
+    """Names with dots, slashes, dollars and scripts the font lacks give a file each, inside the folder."""
+    _, series = identified(50)
+    names = ("../../etc/x", "..", "a/b", "a?b", "$\\frac$", "方位", "<script>")
+    result = {"channel_units": {"motor_position": "$x_"}}
+    paths = write_figures(result, {name: series["stop.h5"] for name in names[:4]}, tmp_path / "figures")
+    paths += write_figures(result, {name: series["stop.h5"] for name in names[4:]}, tmp_path / "more")
+    assert len(set(paths)) == 2 * len(names)
+    assert {path.resolve().parent for path in paths} == {tmp_path / "figures", tmp_path / "more"}
+    assert all(path.is_file() for path in paths)
+
+
+def test_gaps_nulls_and_zeros_are_drawn_around(tmp_path: Path) -> None:
+    """A guess of zero, a null interval, a null in the matrix and a channel without data stop nothing."""
+    result, _ = identified(50)
+    result["parameters"]["motor.friction.tau_c"] |= {"guess": 0.0, "interval95": [None, None]}
+    result["parameters"]["motor.friction.tau_s"] |= {"value": None, "guess": None}
+    result["correlation"]["matrix"][0][1] = None
+    del result["residuals"]["stop.h5"]["motor_position"]
+    result["friction_curves"][0] |= {"lower": None, "upper": None}
+    empty = {name: np.full(5, np.nan) for name in ("measured", "simulated")} | {"time": np.arange(5.0)}
+    assert len(write_figures(result, {"a": {"b": empty}}, tmp_path)) == 12
+
+
+def test_a_curve_is_named_by_what_tells_it_from_the_others() -> None:
+    """Loads are named where they differ, laws where they differ."""
+    light, heavy = {"law": "lugre", "load": 0.0, "load_unit": "N m"}, {"law": "lugre", "load": 20.0, "load_unit": "N m"}
+    other = {"law": "coulomb", "load": 0.0, "load_unit": "N m"}
+    assert [curve_label(curve, [light, heavy]) for curve in (light, heavy)] == ["load 0 N m", "load 20 N m"]
+    assert [curve_label(curve, [light, other]) for curve in (light, other)] == ["lugre", "coulomb"]
+    assert curve_label(light, [light]) == "fitted"
