@@ -20,6 +20,8 @@ class ControlSignals:
     reference_omega: Any
     theta: Any
     omega: Any
+    measures_speed: bool = False
+    """Whether the channel measures the speed itself, so that there is no angle and nothing to differentiate."""
 
 
 def saturate(controller: Controller, command: Any) -> Any:
@@ -85,7 +87,9 @@ def pipeline_length(controller: Controller) -> int:
 
 
 def seen_by_sampled(controller: Controller, seen: ControlSignals, memory: Mapping[str, Any]) -> ControlSignals:
-    """Replace the true speed by the difference quotient that the controller itself computes."""
+    """Replace the true speed by the difference quotient that the controller computes from an angle."""
+    if seen.measures_speed:
+        return seen
     before, long_before = memory["controller.previous1"], memory["controller.previous2"]
     assert controller.sample_time is not None
     if controller.derivative == "two_tap_mean":

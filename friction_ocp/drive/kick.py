@@ -19,6 +19,26 @@ from friction_ocp.friction.element import FrictionElement, StepResponse
 from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, where
 
 NEWTON_STEPS = 3
+NO_LEVEL = 1e-100
+"""Keeps the shares of shafts and their derivatives finite where no shaft of a group has dry friction."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Torques through loaded rigid joints, on their output sides: `symbols` equal `found`, which depends on them."""
+
+    symbols: ca.SX
+    found: ca.SX
+
+    @property
+    def solution(self) -> ca.SX:
+        """The torques, by Newton's method from zero: the equations are piecewise linear."""
+        slope = ca.SX.eye(self.symbols.numel()) - ca.jacobian(self.found, self.symbols)
+        newton = self.symbols - ca.solve(slope, self.symbols - self.found)
+        solution = ca.SX.zeros(self.symbols.numel())
+        for _ in range(NEWTON_STEPS):
+            solution = ca.substitute(newton, self.symbols, solution)
+        return solution
 
 
 @dataclass(frozen=True)
@@ -29,6 +49,8 @@ class Kick:
     """(groups,) speeds after the step."""
     load: dict[str, Any]
     """Torque through each transmission that friction depends on, on its output side."""
+    unknown: Unknown | None = None
+    """The torques in whose symbols `v` and `load` are written; None where they are not."""
 
 
 @dataclass(frozen=True)
@@ -47,26 +69,27 @@ class Step:
 
 def kick(mech: Mechanism, step: Step) -> Kick:
     """Return the speeds after a step of `step.h`."""
+    done = implicit_kick(mech, step)
+    if done.unknown is None:
+        return done
+    symbols, solution = done.unknown.symbols, done.unknown.solution
+    load = {name: ca.substitute(ca.SX(torque), symbols, solution) for name, torque in done.load.items()}
+    return Kick(ca.substitute(done.v, symbols, solution), load)
+
+
+def implicit_kick(mech: Mechanism, step: Step) -> Kick:
+    """Return the speeds after a step in terms of the torques through loaded rigid joints, still to be solved for."""
     joints = mech.loaded_joints()
-    unknown = ca.SX.sym("transmitted", len(joints))  # pyright: ignore[reportArgumentType]
+    symbols = ca.SX.sym("transmitted", len(joints))  # pyright: ignore[reportArgumentType]
     torques, stiffening = _applied(mech, step)
     corner = step.width[len(mech.topology.roots)]
-    elastic = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
-    load = elastic | {joint.name: unknown[k] for k, joint in enumerate(joints)}
+    load = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
+    load |= {joint.name: symbols[k] for k, joint in enumerate(joints)}
     v, friction = _solve(mech, step, torques, stiffening, load)
     if not joints:
         return Kick(v, load)
     found = column([_through(mech, step, joint, torques, v, friction) for joint in joints])
-    newton = unknown - ca.solve(_slope(found, unknown), unknown - found)
-    solution = ca.SX.zeros(len(joints))
-    for _ in range(NEWTON_STEPS):
-        solution = ca.substitute(newton, unknown, solution)
-    solved = {joint.name: solution[k] for k, joint in enumerate(joints)}
-    return Kick(ca.substitute(v, unknown, solution), elastic | solved)
-
-
-def _slope(found: ca.SX, unknown: ca.SX) -> ca.SX:
-    return ca.SX.eye(unknown.numel()) - ca.jacobian(found, unknown)
+    return Kick(v, load, Unknown(symbols, found))
 
 
 def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
@@ -132,14 +155,20 @@ def _combined(mech: Mechanism, responses: dict[str, StepResponse]) -> StepRespon
     offset, slope, upper, lower = 0.0, 0.0, 0.0, 0.0
     for name, response in responses.items():
         ratio = mech.topology.speed_ratio[name]
-        forward = where(ca.SX(ratio) > 0, response.upper, response.lower)
-        backward = where(ca.SX(ratio) > 0, response.lower, response.upper)
-        size = smooth_abs(ratio) if isinstance(ratio, ca.SX) else abs(ratio)
+        forward, backward = _levels(ratio, response)
         offset += ratio * response.offset
         slope += ratio**2 * response.slope
-        upper += size * forward
-        lower += size * backward
+        upper += forward
+        lower += backward
     return StepResponse(offset, slope, upper, lower)
+
+
+def _levels(ratio: Any, response: StepResponse) -> tuple[Any, Any]:
+    """Return the set-valued levels of a shaft as its group feels them, forward and backward motion of the group."""
+    size = smooth_abs(ratio) if isinstance(ratio, ca.SX) else abs(ratio)
+    same = ca.SX(ratio) > 0
+    forward, backward = where(same, response.upper, response.lower), where(same, response.lower, response.upper)
+    return size * forward, size * backward
 
 
 def _shared(
@@ -153,12 +182,15 @@ def _shared(
 ) -> dict[str, Any]:
     """Divide the friction of a group among its shafts; the set-valued part by the shares of the levels."""
     mean = 0.5 * (step.v[group] + after)
+    only = sum(not ca.SX(item.upper + item.lower).is_zero() for item in responses.values()) <= 1
     friction: dict[str, Any] = {}
     for name, response in responses.items():
         ratio = mech.topology.speed_ratio[name]
-        own_level, level = response.upper + response.lower, whole.upper + whole.lower
-        only = sum(not ca.SX(item.upper + item.lower).is_zero() for item in responses.values()) <= 1
-        share = (0.0 if ca.SX(own_level).is_zero() else 1.0) if only else ratio * own_level / (level + 1e-300)
+        if only:
+            share: Any = 0.0 if ca.SX(response.upper + response.lower).is_zero() else 1.0
+        else:
+            forward, backward = _levels(ratio, response)
+            share = where(set_valued >= 0, forward / (whole.upper + NO_LEVEL), backward / (whole.lower + NO_LEVEL))
         friction[name] = response.offset + response.slope * mean * ratio + set_valued * share / ratio
     return friction
 

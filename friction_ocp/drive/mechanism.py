@@ -141,7 +141,7 @@ class Mechanism:
         rate = (
             self.shaft_speed(item.from_shaft, motion.v) / item.ratio - self.shaft_speed(item.to_shaft, motion.v)
         )
-        if isinstance(item.backlash, float) and item.backlash == 0.0:
+        if not isinstance(item.backlash, ca.SX) and item.backlash == 0.0:
             return item.stiffness * twist + item.damping * rate
         half = 0.5 * item.backlash
         inside = symbol("twist")
@@ -175,19 +175,27 @@ class Mechanism:
         torque = self.true_input(f"{motor.name}.torque")
         if torque is None:
             torque = self._commanded(motor, "torque", motion)
-        if torque is None:
-            current = self.motor_current(motor, motion)
-            torque = 0.0 if current is None else motor.torque_constant * current
+        if torque is not None:
+            return self._enabled(motor, torque)
+        current = self.motor_current(motor, motion)
+        return 0.0 if current is None else motor.torque_constant * current
+
+    def _enabled(self, motor: Motor, value: Any) -> Any:
         enable = self.true_input(f"{motor.name}.enable")
-        return torque if enable is None else where(enable > 0.5, torque, 0.0)
+        return value if enable is None else where(enable > 0.5, value, 0.0)
 
     def motor_current(self, motor: Motor, motion: Motion) -> Any | None:
-        """Return the winding current; None for a motor driven by torque."""
+        """Return the winding current, 0 while the motor is not enabled; None for a motor driven by torque."""
+        current = self._current(motor, motion)
+        return None if current is None else self._enabled(motor, current)
+
+    def _current(self, motor: Motor, motion: Motion) -> Any | None:
         if self._has_winding_state(motor):
             return motion.extra[self.extra_names.index(f"{motor.name}.current")]
-        current = self.true_input(f"{motor.name}.current")
-        if current is not None:
-            return motor.share * current
+        for signal in ("current", "current_command"):
+            current = self.true_input(f"{motor.name}.{signal}")
+            if current is not None:
+                return motor.share * current
         commanded = self._commanded(motor, "current", motion)
         if commanded is not None:
             return commanded
@@ -231,10 +239,11 @@ class Mechanism:
         channel = next(item for item in self.drive.channels if item.name == controller.feedback)
         theta = self.shaft_angle(channel.part, motion) * channel.gain + channel.offset
         omega = self.shaft_speed(channel.part, motion.v) * channel.gain
+        inputs = [self.true_input(f"reference.{signal}") for signal in ("theta", "omega")]
+        wanted = [0.0 if item is None else item for item in inputs]
         if channel.signal == "omega":
-            theta, omega = 0.0, omega + channel.offset
-        wanted = (self.true_input("reference.theta"), self.true_input("reference.omega"))
-        return ControlSignals(*(0.0 if item is None else item for item in wanted), theta, omega)
+            return ControlSignals(*wanted, 0.0, omega + channel.offset, measures_speed=True)
+        return ControlSignals(*wanted, theta, omega)
 
     def extra_rates(self, motion: Motion) -> ca.SX:
         """Return the time derivatives of the continuous states beside motion and bristles."""
@@ -243,8 +252,8 @@ class Mechanism:
             if self._has_winding_state(motor):
                 current = motion.extra[self.extra_names.index(f"{motor.name}.current")]
                 emf = motor.torque_constant * self.shaft_speed(motor.shaft, motion.v)
-                drop = self.motor_voltage(motor, motion) - motor.resistance * current - emf
-                rates.append(drop / motor.inductance)
+                driving = self._enabled(motor, self.motor_voltage(motor, motion) - emf)
+                rates.append((driving - motor.resistance * current) / motor.inductance)
         if "controller.integral" in self.extra_names:
             controller = self.drive.controller
             assert controller is not None

@@ -6,15 +6,29 @@ drift again. Order 2 on smooth motion.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from friction_ocp.drive.control import apply_tick, compute_tick
-from friction_ocp.drive.kick import Step, kick, transmitted_torque
+from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Channel, Drive
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """A model function before the torques through rigid joints that friction depends on are solved for.
+
+    Differentiating this is cheaper than differentiating Newton's method.
+    """
+
+    relation: ca.Function
+    """(arguments, torques) -> (value, torques found); `torques` solve torques = torques found."""
+    torques: ca.Function
+    """arguments -> torques."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +50,8 @@ class SteppedDrive:
     output: ca.Function
     tick: ca.Function | None
     start: ca.Function
+    implicit: Mapping[str, Implicit]
+    """`step` and `output` in implicit form, where friction depends on the torque through a rigid joint."""
 
 
 @dataclass(frozen=True)
@@ -93,22 +109,50 @@ def _passes(mech: Mechanism) -> int:
     return 2 if coupled else 1
 
 
-def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> ca.SX:
+@dataclass(frozen=True)
+class _Expression:
+    """A value in terms of unknown torques; each unknown may depend on those before it."""
+
+    value: ca.SX
+    unknowns: tuple[Unknown, ...]
+
+    def solved(self) -> ca.SX:
+        """Return the value without unknowns."""
+        value = self.value
+        for unknown in reversed(self.unknowns):
+            value = ca.substitute(value, unknown.symbols, unknown.solution)
+        return value
+
+    def implicit(self, arguments: list[ca.SX]) -> Implicit:
+        """Return the value as an implicit function of `arguments`."""
+        symbols = ca.vertcat(*[unknown.symbols for unknown in self.unknowns])
+        found = ca.vertcat(*[unknown.found for unknown in self.unknowns])
+        torques = _Expression(symbols, self.unknowns).solved()
+        return Implicit(
+            ca.Function("relation", [*arguments, symbols], [self.value, found]),
+            ca.Function("torques", arguments, [torques]),
+        )
+
+
+def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     q0, v0 = _angles(mech, state.angles), _speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * _pick(v0, mech.angle_groups)
     middle, mean = _angles(mech, free_angles), v0
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
     extra, v1, load = state.extra, v0, dict[str, Any]()
+    unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
         at = Motion(middle, mean, extra, state.memory)
-        done = kick(mech, Step(h, v0, at, bristle, width))
+        done = implicit_kick(mech, Step(h, v0, at, bristle, width))
         v1, load = done.v, done.load
+        unknowns += [] if done.unknown is None else [done.unknown]
         mean = 0.5 * (v0 + v1)
         extra = 0.5 * (state.extra + _advance_extra(mech, state, Motion(middle, mean, state.extra, state.memory), h))
     after = 2.0 * extra - state.extra
     angles = free_angles + 0.5 * h * _pick(v1, mech.angle_groups)
     deflections = _advance_bristles(mech, state, mean, h, load)
-    return ca.vertcat(angles, _pick(v1, mech.free_groups), deflections, after, state.memory)
+    value = ca.vertcat(angles, _pick(v1, mech.free_groups), deflections, after, state.memory)
+    return _Expression(value, tuple(unknowns))
 
 
 def _pick(vector: ca.SX, groups: tuple[int, ...]) -> ca.SX:
@@ -133,12 +177,13 @@ def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, loa
     return column(after)
 
 
-def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> ca.SX:
+def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     q, v = _angles(mech, state.angles), _speeds(mech, state.speeds)
     at = Motion(q, v, state.extra, state.memory)
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
-    acceleration = (kick(mech, Step(h, v, at, bristle, width)).v - v) / h
-    return column([_recorded(mech, channel, at, acceleration) for channel in mech.drive.outputs])
+    done = implicit_kick(mech, Step(h, v, at, bristle, width))
+    value = column([_recorded(mech, channel, at, (done.v - v) / h) for channel in mech.drive.outputs])
+    return _Expression(value, () if done.unknown is None else (done.unknown,))
 
 
 def _recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
@@ -236,7 +281,8 @@ def stepped(drive: Drive) -> SteppedDrive:
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")  # pyright: ignore[reportArgumentType]
     y, dy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy"))  # pyright: ignore[reportArgumentType]
-    advance = _advance(mech, state, h, width)
+    arguments = [state.x, u, p, h, width]
+    maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
     return SteppedDrive(
         mechanism=mech,
@@ -244,8 +290,9 @@ def stepped(drive: Drive) -> SteppedDrive:
         input_names=tuple(mech.inputs),
         parameter_names=tuple(mech.parameters),
         output_names=tuple(channel.name for channel in mech.drive.outputs),
-        step=ca.Function("step", [state.x, u, p, h, width], [advance]),
-        output=ca.Function("output", [state.x, u, p, h, width], [_outputs(mech, state, h, width)]),
+        step=ca.Function("step", arguments, [maps["step"].solved()]),
+        output=ca.Function("output", arguments, [maps["output"].solved()]),
         tick=tick,
         start=ca.Function("start", [y, dy, u, p], [_start(mech, y, dy)]),
+        implicit={name: item.implicit(arguments) for name, item in maps.items() if item.unknowns},
     )

@@ -11,13 +11,17 @@ import numpy as np
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
-from friction_ocp.estimation.fit import Fitted, Progress, fit, silent
+from friction_ocp.estimation.fit import Fitted, fit, program_builder
+from friction_ocp.estimation.gauss_newton import Solution
+from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.noise import NoiseFloor
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
@@ -90,18 +94,44 @@ class Estimate:
         return {item.name: item.value for item in self.parameters}
 
 
+class Interrupted(Exception):
+    """A fit was stopped by the user; `estimate` is its last iterate."""
+
+    def __init__(self, estimate: Estimate) -> None:
+        super().__init__(estimate.message)
+        self.estimate = estimate
+
+
 def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     """Fit every parameter of a problem that has a guess.
 
-    Raises FrictionOcpError where the recordings do not fit the drive. A fit that did not converge is returned with
-    `converged` False and says why in `message`.
+    Raises FrictionOcpError where the recordings do not fit the drive, and Interrupted, which carries the last
+    iterate, on Ctrl-C. A fit that did not converge is returned with `converged` False and says why in `message`.
     """
     began = time.perf_counter()
     model = prepare(problem)
     built = time.perf_counter()
-    fitted = fit(model, progress)
-    seconds = time.perf_counter() - built
-    return conclude(model, fitted, built - began, seconds)
+    reports: list[Report] = []
+
+    def remember(report: Report) -> None:
+        if report.point.theta.size == model.space.guess.size:
+            reports[:] = [report]
+        progress(report)
+
+    try:
+        fitted = fit(model, remember)
+    except KeyboardInterrupt:
+        stopped = _last_iterate(model, reports)
+        raise Interrupted(conclude(model, stopped, built - began, time.perf_counter() - built)) from None
+    return conclude(model, fitted, built - began, time.perf_counter() - built)
+
+
+def _last_iterate(model: Model, reports: list[Report]) -> Fitted:
+    program = program_builder(model)(model, 0.0, Squares())
+    theta = reports[0].point.theta if reports else model.space.guess
+    point = Point(theta, program.suggested_nodes(theta))
+    where = f"in phase '{reports[0].phase}', iteration {reports[0].iteration}" if reports else "before the first step"
+    return Fitted(Solution(point, program.objective(point), 0, False, f"interrupted {where}"), program)
 
 
 def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float) -> Estimate:

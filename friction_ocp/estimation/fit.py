@@ -13,14 +13,13 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.horizon import fits_free_run, horizon
+from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.stages import WIDTHS, free_run, losses, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray
 
-Progress = Callable[[str, int, float, Point], None]
-"""Called with phase, iteration, objective and point."""
-
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()
+EXPECTED_PHASES = 10
 RELEASES = (0.02, 0.1, 0.5)
 """Stribeck speeds, over the typical speed of the drive, from which the released parameters start."""
 
@@ -33,16 +32,12 @@ class Fitted:
     program: Program
 
 
-def silent(phase: str, iteration: int, objective: float, point: Point) -> None:
-    """Report nothing."""
-
-
 def fit(model: Model, progress: Progress = silent) -> Fitted:
     """Fit the parameters of a problem from its guesses."""
-    builder = program_builder(model)
-    candidates = _candidates(model, builder, progress)
-    best = _tournament(model, builder, candidates, "candidate", progress)
-    return _finish(model, builder, best, progress)
+    builder, phases = program_builder(model), Phases(progress, EXPECTED_PHASES)
+    candidates = _candidates(model, builder, phases)
+    best = _tournament(model, builder, candidates, "candidate", phases)
+    return _finish(model, builder, best, phases)
 
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
@@ -56,19 +51,19 @@ def program_builder(model: Model) -> Builder:
     return lambda model, width, loss: relaxed(model, model.train, width, loss)
 
 
-def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, progress: Progress) -> Solution:
-    return solve_gauss_newton(program, point, tolerances, lambda k, f, at: progress(phase, k, f, at))
+def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, phases: Phases) -> Solution:
+    return solve_gauss_newton(program, point, tolerances, phases.begin(phase))
 
 
-def _predicted(model: Model, progress: Progress) -> FloatArray:
+def _predicted(model: Model, phases: Phases) -> FloatArray:
     """Return the parameters that best predict the smoothed motion over short times."""
     program = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
-    return _solve(program, start, COARSE, "short predictions", progress).point.theta
+    return _solve(program, start, COARSE, "short predictions", phases).point.theta
 
 
 def _tournament(
-    model: Model, builder: Builder, starts: Sequence[FloatArray], phase: str, progress: Progress
+    model: Model, builder: Builder, starts: Sequence[FloatArray], phase: str, phases: Phases
 ) -> Point:
     """Solve the first stage from every start and return the best end."""
     program = builder(model, WIDTHS[0], Squares())
@@ -76,19 +71,19 @@ def _tournament(
     loss = min((next(losses(model, program, point)) for point in points), key=lambda item: getattr(item, "rounding", 0))
     program = replace(program, loss=loss)
     ends = [
-        _solve(program, point, COARSE, f"{phase} {k + 1} of {len(points)}", progress) for k, point in enumerate(points)
+        _solve(program, point, COARSE, f"{phase} {k + 1} of {len(points)}", phases) for k, point in enumerate(points)
     ]
     return min(ends, key=lambda end: end.objective).point
 
 
-def _candidates(model: Model, builder: Builder, progress: Progress) -> list[FloatArray]:
+def _candidates(model: Model, builder: Builder, phases: Phases) -> list[FloatArray]:
     """Return starts for the full model: the guess, the predictions, and what the nested model leads to."""
     simple = nested_space(model.problem, model.space)
     if simple is model.space:
-        return [model.space.guess, _predicted(model, progress)]
+        return [model.space.guess, _predicted(model, phases)]
     inner = replace(model, space=simple)
-    starts = [simple.guess, _predicted(inner, progress)]
-    best = _tournament(inner, builder, starts, "simpler friction", progress)
+    starts = [simple.guess, _predicted(inner, phases)]
+    best = _tournament(inner, builder, starts, "simpler friction", phases)
     return released(model, simple, best.theta)
 
 
@@ -110,7 +105,7 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     return starts
 
 
-def _finish(model: Model, builder: Builder, point: Point, progress: Progress) -> Fitted:
+def _finish(model: Model, builder: Builder, point: Point, phases: Phases) -> Fitted:
     """Sharpen width and loss down to the exact problem."""
     program = builder(model, WIDTHS[0], Squares())
     stages = list(losses(model, program, point))
@@ -118,7 +113,7 @@ def _finish(model: Model, builder: Builder, point: Point, progress: Progress) ->
     for k, loss in enumerate(stages):
         last = k == len(stages) - 1
         program = builder(model, WIDTHS[min(k, len(WIDTHS) - 1)], loss)
-        solution = _solve(program, point, FINE if last else COARSE, f"stage {k + 1} of {len(stages)}", progress)
+        solution = _solve(program, point, FINE if last else COARSE, f"stage {k + 1} of {len(stages)}", phases)
         point, iterations = solution.point, iterations + solution.iterations
     assert solution is not None
     return Fitted(replace(solution, iterations=iterations), program)

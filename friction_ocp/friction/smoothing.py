@@ -10,7 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-TINY = 1e-30
+TINY = 1e-300
+"""Keeps the root of a square differentiable at zero without showing in any sum of doubles."""
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
@@ -47,7 +48,12 @@ def soft_threshold(value: Any, upper: Any, lower: Any, width: Any = 0.0) -> Any:
     below; `width` rounds the two corners. The same function is the dead zone of a backlash.
     """
     level = where(value >= 0, upper, lower)
-    return value + 0.5 * (smooth_abs(value - level, width) - smooth_abs(value + level, width))
+    return _rounded_part(value - level, width) - _rounded_part(-value - level, width)
+
+
+def _rounded_part(value: Any, width: Any) -> Any:
+    """max(value, 0), rounded over `width`; exactly 0 for negative values where `width` is 0."""
+    return 0.5 * (value + smooth_abs(value, width))
 
 
 def positive_part(value: Any) -> Any:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from friction_ocp.plots.palette import INK, NEGATIVE, POSITIVE
-from friction_ocp.plots.style import WIDTH, axes_grid, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from friction_ocp.plots.style import WIDTH, Figure, axes_grid, new_figure
 
 _WRITTEN_UP_TO = 16  # parameters: beyond, the numbers would not be readable
 
@@ -28,7 +25,7 @@ def correlation_figure(correlation: Mapping[str, Any]) -> Figure:
     side = max(2.5, min(0.46 * count, 14.0))
     figure = new_figure(side + 1.0, max(WIDTH, side + 4.5))
     axes = axes_grid(figure, 1)[0][0]
-    scale: Any = LinearSegmentedColormap.from_list("correlation", [NEGATIVE, "#ffffff", POSITIVE])
+    scale = LinearSegmentedColormap.from_list("correlation", [NEGATIVE, "#ffffff", POSITIVE])
     image = axes.imshow(matrix, cmap=scale, vmin=-1.0, vmax=1.0)
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
@@ -36,7 +33,7 @@ def correlation_figure(correlation: Mapping[str, Any]) -> Figure:
     axes.set_xticks(range(count), [str(number + 1) for number in range(count)])
     axes.set_yticks(range(count), [f"{name}  {number + 1}" for number, name in enumerate(names)])
     axes.set_title("Correlation of the estimates", pad=12)
-    figure.colorbar(image, ax=axes, shrink=0.8, ticks=[-1, -0.5, 0, 0.5, 1]).outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    figure.colorbar(image, ax=axes, shrink=0.8, ticks=[-1, -0.5, 0, 0.5, 1]).outline.set_visible(False)
     if count <= _WRITTEN_UP_TO:
         for (row, column), value in np.ndenumerate(matrix):
             if np.isfinite(value):

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from friction_ocp.plots.numbers import plain, unit_text
 from friction_ocp.plots.palette import MUTED, colour
 from friction_ocp.plots.series import FloatArray
-from friction_ocp.plots.style import axes_grid, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
 
 Curve = Mapping[str, Any]
 _LABEL_SPACING = 0.055  # of the height of the axes
@@ -44,7 +40,7 @@ def _figure(shaft: str, curves: Sequence[Curve]) -> Figure:
         if len(lower) == len(speed) == len(upper):
             axes.fill_between(speed, lower, upper, color=colour(index), alpha=0.18, linewidth=0)
         axes.plot(speed, torque, color=colour(index), linewidth=1.8)
-        if len(speed):
+        if len(speed) and len(curves) > 1:
             ends.append((float(speed[-1]), float(torque[-1]), curve_label(curve, curves), colour(index)))
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
     axes.axvline(0.0, color=MUTED, linewidth=0.8)
@@ -63,8 +59,15 @@ def _label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> No
     for speed, torque, label, colour_ in sorted(ends, key=lambda end: end[1]):
         height = max(torque, previous + _LABEL_SPACING * (top - bottom))
         previous = height
-        at: dict[str, Any] = {"xytext": (8, 0), "textcoords": "offset points", "annotation_clip": False}
-        axes.annotate(label, (speed, height), va="center", color=colour_, **at)
+        axes.annotate(
+            label,
+            (speed, height),
+            xytext=(8, 0),
+            textcoords="offset points",
+            va="center",
+            color=colour_,
+            annotation_clip=False,
+        )
 
 
 def _array(values: Sequence[float | None] | None) -> FloatArray:

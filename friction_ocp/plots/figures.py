@@ -5,18 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from friction_ocp.plots.correlation import correlation_figure
 from friction_ocp.plots.curves import friction_figures
 from friction_ocp.plots.overview import overview_figure
+from friction_ocp.plots.reading import objects, part, rows
 from friction_ocp.plots.series import Series
-from friction_ocp.plots.style import figure_style, save
+from friction_ocp.plots.style import Figure, figure_style, save
 from friction_ocp.plots.traces import traces_figure
 from friction_ocp.plots.whiteness import whiteness_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def write_figures(result: Mapping[str, Any], series: Series, folder: Path) -> list[Path]:
@@ -26,29 +24,27 @@ def write_figures(result: Mapping[str, Any], series: Series, folder: Path) -> li
     taken: set[str] = set()
     with figure_style():
         for name, figure in _figures(result, series):
-            paths += save(figure, folder / _file_stem(name, taken))
+            paths += save(figure, folder / file_stem(name, taken))
     return paths
 
 
 def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, Figure]]:
     """Yield the name and figure of whatever the result has, one at a time to hold few in memory."""
-    if result.get("parameters"):
-        yield "parameters", overview_figure(result["parameters"])
+    if part(result, "parameters"):
+        yield "parameters", overview_figure(objects(result, "parameters"))
     yield from (
-        (f"traces-{recording}", traces_figure(recording, channels, result.get("channel_units", {})))
+        (f"traces-{recording}", traces_figure(recording, channels, part(result, "channel_units")))
         for recording, channels in series.items()
         if channels
     )
-    yield from (
-        (f"friction-{shaft}", figure) for shaft, figure in friction_figures(result.get("friction_curves") or [])
-    )
-    if any((result.get("residuals") or {}).values()):
-        yield "residual-autocorrelation", whiteness_figure(result["residuals"])
-    if (result.get("correlation") or {}).get("names"):
-        yield "correlation", correlation_figure(result["correlation"])
+    yield from ((f"friction-{shaft}", figure) for shaft, figure in friction_figures(rows(result, "friction_curves")))
+    if any(objects(result, "residuals").values()):
+        yield "residual-autocorrelation", whiteness_figure(objects(result, "residuals"))
+    if rows(part(result, "correlation"), "names"):
+        yield "correlation", correlation_figure(part(result, "correlation"))
 
 
-def _file_stem(name: str, taken: set[str]) -> str:
+def file_stem(name: str, taken: set[str]) -> str:
     """Return a file name that no recording name can lead out of the folder or onto another figure."""
     stem = re.sub(r"[^\w.-]+|\.{2,}", "_", name.removesuffix(".h5"), flags=re.ASCII)[:100]
     unique = stem

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from friction_ocp.plots.numbers import is_number, to_resolution, unit_text
 from friction_ocp.plots.palette import MUTED, VERDICT_WORDS, VERDICTS
-from friction_ocp.plots.style import axes_grid, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from friction_ocp.plots.reading import rows
+from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
 
 _MARKERS = {"ok": "o", "at_bound": "s", "traded": "D", "not_identifiable": "X"}
 _LOG_BEYOND = 5.0  # largest over smallest ratio that a linear axis shows well
@@ -33,10 +30,10 @@ class _Row:
 
 def overview_figure(parameters: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw one line a parameter, first at the top; the marker's shape tells the verdict."""
-    rows = [_row(name, parameter) for name, parameter in parameters.items()]
-    figure = new_figure(1.5 + 0.36 * len(rows), 9.0)
+    lines = [_row(name, parameter) for name, parameter in parameters.items()]
+    figure = new_figure(1.5 + 0.36 * len(lines), 9.0)
     axes = axes_grid(figure, 1)[0][0]
-    low, high = _limits(rows)
+    low, high = _limits(lines)
     if low > 0 and high / low > _LOG_BEYOND:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
@@ -45,35 +42,37 @@ def overview_figure(parameters: Mapping[str, Mapping[str, Any]]) -> Figure:
         low, high = low - 0.12 * (high - low), high + 0.12 * (high - low)
     axes.set_xlim(low, high)
     axes.axvline(1.0, color=MUTED, linewidth=1.2)
-    for index, row in enumerate(rows):
+    for index, row in enumerate(lines):
         _draw(axes, index, row, (low, high))
-    axes.set_yticks(range(len(rows)), [row.name for row in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_yticks(range(len(lines)), [row.name for row in lines])
+    axes.set_ylim(len(lines) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     axes.set_title("Parameters over their guesses, with 95 % intervals", pad=26)
-    axes.set_xlabel("value / guess; arrow: the interval goes on")
-    _legend(axes, list(dict.fromkeys(row.verdict for row in rows)))
+    axes.set_xlabel("value / guess, or over itself where the guess is 0; arrow: the interval goes on")
+    _legend(axes, list(dict.fromkeys(row.verdict for row in lines)))
     return figure
 
 
 def _row(name: str, parameter: Mapping[str, Any]) -> _Row:
-    value, guess = parameter["value"], parameter.get("guess")
-    scale = guess if is_number(guess) and guess != 0 else (value or 1.0)
-    bounds = parameter.get("interval95")
+    value: Any = parameter.get("value")
+    guess: Any = parameter.get("guess")
+    scale: float = guess if is_number(guess) and guess != 0 else (value or 1.0)
+    bounds = rows(parameter, "interval95")
     interval = None
-    if bounds and all(is_number(bound) for bound in bounds):
+    if len(bounds) == 2 and all(is_number(bound) for bound in bounds):
         first, last = sorted(bound / scale for bound in bounds)
         interval = (first, last)
     text = f"{to_resolution(value, parameter.get('std_error'))} {unit_text(parameter.get('unit', ''))}".rstrip()
     if scale is not guess:
         text += " (guess 0)" if guess == 0 else " (no guess)"
-    return _Row(name, value / scale, interval, str(parameter.get("verdict", "ok")), text)
+    ratio = value / scale if is_number(value) else np.nan
+    return _Row(name, ratio, interval, str(parameter.get("verdict", "ok")), text)
 
 
-def _limits(rows: Sequence[_Row]) -> tuple[float, float]:
+def _limits(lines: Sequence[_Row]) -> tuple[float, float]:
     """Return the range that shows the guess, every value and every trusted interval, at least from 0.8 to 1.2."""
-    trusted = [bound for row in rows if row.verdict == "ok" and row.interval for bound in row.interval]
-    finite = [ratio for ratio in [*trusted, *(row.ratio for row in rows)] if np.isfinite(ratio)]
+    trusted = [bound for row in lines if row.verdict == "ok" and row.interval for bound in row.interval]
+    finite = [ratio for ratio in [*trusted, *(row.ratio for row in lines)] if np.isfinite(ratio)]
     return min([0.8, *finite]), max([1.2, *finite])
 
 
@@ -86,13 +85,20 @@ def _draw(axes: Axes, index: int, row: _Row, limits: tuple[float, float]) -> Non
             if beyond:
                 axes.plot([end], [index], marker=marker, color=colour, markersize=6, clip_on=False)
     axes.plot([row.ratio], [index], marker=_MARKERS.get(row.verdict, "o"), color=colour, markersize=7, zorder=3)
-    at: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center", "fontsize": 9.5}
-    axes.text(1.02, index, row.text, **at)
+    axes.text(1.02, index, row.text, transform=axes.get_yaxis_transform(), va="center", fontsize=9.5)
 
 
 def _legend(axes: Axes, verdicts: Sequence[str]) -> None:
     for verdict in verdicts:
-        look: dict[str, Any] = {"marker": _MARKERS.get(verdict, "o"), "color": VERDICTS.get(verdict, MUTED)}
-        axes.plot([], [], linestyle="none", markersize=7, label=VERDICT_WORDS.get(verdict, verdict), **look)
-    at: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 4, "borderaxespad": 0.2}
-    axes.legend(handletextpad=0.1, columnspacing=1.2, **at)
+        axes.plot(
+            [],
+            [],
+            linestyle="none",
+            marker=_MARKERS.get(verdict, "o"),
+            markersize=7,
+            color=VERDICTS.get(verdict, MUTED),
+            label=VERDICT_WORDS.get(verdict, verdict),
+        )
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2, handletextpad=0.1, columnspacing=1.2
+    )

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, TypeAlias, cast
 
 from friction_ocp.plots.palette import GRID, INK, MUTED
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+# matplotlib types few of its keywords, so its objects stay untyped here.
+Axes: TypeAlias = Any
+Figure: TypeAlias = Any
 
 WIDTH = 8.0
 """Inches."""
@@ -57,11 +57,12 @@ _RC: dict[str, Any] = {
 
 
 @contextmanager
-def figure_style() -> Iterator[None]:
+def figure_style() -> Generator[None]:
     """Apply the look within; text is taken literally, and glyphs that the font lacks pass in silence."""
     import matplotlib
 
-    with matplotlib.rc_context(cast("Any", _RC)), warnings.catch_warnings():
+    rc_context = cast("Any", matplotlib).rc_context
+    with rc_context(_RC), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
@@ -75,7 +76,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> list[list[Axes]]:
     """Return axes by row and column; `options` go to `Figure.subplots`."""
-    grid: Any = figure.subplots(rows, columns, squeeze=False, **options)
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
     return [list(row) for row in grid]
 
 
@@ -87,6 +88,7 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     paths: list[Path] = []
     for ending, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = stem.with_name(f"{stem.name}.{ending}")
-        figure.savefig(path, format=ending, metadata=cast("Any", metadata))
+        figure.savefig(path, format=ending, metadata=metadata)
+        figure.set_layout_engine("none")  # laid out once, for both files
         paths.append(path)
     return paths

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friction_ocp.plots.numbers import significant, unit_text
 from friction_ocp.plots.palette import GRID, MEASURED, MUTED, RESIDUAL, SIMULATED
 from friction_ocp.plots.series import ChannelColumns, Trace, traces_of
-from friction_ocp.plots.style import axes_grid, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
 
 
 def traces_figure(recording: str, channels: Mapping[str, ChannelColumns], units: Mapping[str, str]) -> Figure:
@@ -38,8 +33,7 @@ def _draw(upper: Axes, lower: Axes, name: str, trace: Trace, unit: str) -> None:
     upper.plot(trace.time, trace.simulated, color=SIMULATED, linewidth=1.1, label="simulated")
     upper.set_title(name)
     upper.set_ylabel(f"value{suffix}")
-    legend: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 2, "borderaxespad": 0.1}
-    upper.legend(**legend)
+    upper.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
     lower.axhline(0.0, color=GRID, linewidth=1.2)
     lower.plot(trace.time, trace.residual, color=RESIDUAL, linewidth=0.9)
     lower.set_ylabel(f"residual{suffix}", fontsize=9)

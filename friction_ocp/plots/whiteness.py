@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from friction_ocp.plots.palette import MUTED, RESIDUAL, VERDICTS
-from friction_ocp.plots.style import WIDTH, axes_grid, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from friction_ocp.plots.style import WIDTH, Axes, Figure, axes_grid, new_figure
 
 Residual = Mapping[str, Any]
 
@@ -40,5 +36,13 @@ def _draw(axes: Axes, residual: Residual) -> None:
     axes.plot(residual["lag_s"], residual["autocorrelation"], color=RESIDUAL)
     axes.set_ylim(-1.05, 1.05)
     white = bool(residual.get("white"))
-    at: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 9}
-    axes.text(0.99, 0.97, "white" if white else "not white", color=VERDICTS["ok" if white else "at_bound"], **at)
+    axes.text(
+        0.99,
+        0.97,
+        "white" if white else "not white",
+        color=VERDICTS["ok" if white else "at_bound"],
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=9,
+    )

@@ -9,10 +9,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from friction_ocp.plots import palette
 from friction_ocp.plots.numbers import plain
+from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
 from friction_ocp.report.sentence import verdict_sentence
@@ -32,33 +33,37 @@ class EmbeddedRecording:
     residuals: str
 
 
-def write_report(result: Mapping[str, Any], series: Series, path: Path) -> None:
+def write_report(result: Json, series: Series, path: Path) -> None:
     """Write report.html in one step: a reader sees the old file or the whole new one."""
     replace_file(path, render_report(result, series))
 
 
-def render_report(result: Mapping[str, Any], series: Series) -> str:
+def render_report(result: Json, series: Series) -> str:
     """Return the page of an identification."""
-    solver, provenance = result.get("solver") or {}, result.get("provenance") or {}
+    friction = friction_payload(rows(result, "friction_curves"))
+    solver, provenance = part(result, "solver"), dict(part(result, "provenance"))
+    checksums = part(provenance, "recordings")
+    provenance.pop("recordings", None)
     return render_page(
         "identify.html",
         {
-            "result": result,
+            **{key: str(result.get(key) or "") for key in ("title", "question", "problem", "message")},
             "converged": result.get("status") == "converged",
             "verdict": verdict_sentence(result),
-            "parameters": parameter_rows(result.get("parameters") or {}),
-            "fit": fit_rows(result.get("fit") or {}),
-            "horizon": plain((result.get("fit") or {}).get("horizon_s")),
-            "parts": fit_rows_by_recording(result.get("fit") or {}),
+            "warnings": rows(result, "warnings"),
+            "parameters": parameter_rows(objects(result, "parameters")),
+            "horizon": plain(part(result, "fit").get("horizon_s")),
+            "whole": part(result, "fit").get("horizon_s") is None,
+            "fit": fit_rows(part(result, "fit")),
+            "parts": fit_rows_by_recording(part(result, "fit")),
             "recordings": _recordings(result, series),
-            "friction": friction_payload(result.get("friction_curves") or []),
-            "friction_json": embedded_json(friction_payload(result.get("friction_curves") or [])),
-            "correlation": correlation_rows(result.get("correlation") or {}),
-            "solver": {str(key).replace("_", " "): _fact(value) for key, value in solver.items()},
-            "provenance": {
-                str(key).replace("_", " "): _fact(value) for key, value in provenance.items() if key != "recordings"
-            },
-            "checksums": provenance.get("recordings") or {},
+            "friction": friction,
+            "friction_json": embedded_json(friction),
+            "residuals": objects(result, "residuals"),
+            "correlation": correlation_rows(part(result, "correlation")),
+            "solver": _facts(solver),
+            "provenance": _facts(provenance),
+            "checksums": checksums,
         },
     )
 
@@ -67,7 +72,7 @@ def render_page(template: str, context: Mapping[str, Any]) -> str:
     """Fill a template of this package; only the page's own two scripts may run, and nothing may be loaded."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
+    from plotly.offline import get_plotlyjs  # pyright: ignore[reportMissingTypeStubs]
 
     def breakable(name: str) -> Markup:
         return Markup("<wbr>").join(re.split(r"(?<=[._@/-])", name))
@@ -100,27 +105,29 @@ def replace_file(path: Path, text: str) -> None:
         draft.unlink(missing_ok=True)
 
 
-def _recordings(result: Mapping[str, Any], series: Series) -> list[EmbeddedRecording]:
+def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
     """Return the recordings in the order of the result, then any that only the series have."""
-    roles: Mapping[str, Sequence[str]] = result.get("recordings") or {}
-    splits = {name: split for key, split in SPLITS.items() for name in roles.get(key) or ()}
-    units, residuals = result.get("channel_units") or {}, result.get("residuals") or {}
+    splits = {str(name): split for key, split in SPLITS.items() for name in rows(part(result, "recordings"), key)}
+    units, residuals = part(result, "channel_units"), part(result, "residuals")
     return [
         EmbeddedRecording(
             index,
             name,
             splits.get(name, "other"),
             embedded_json(recording_payload(series.get(name, {}), units)),
-            embedded_json(residual_payload(residuals.get(name, {}))),
+            embedded_json(residual_payload(objects(residuals, name))),
         )
         for index, name in enumerate(dict.fromkeys([*splits, *series]))
     ]
 
 
+def _facts(facts: Json) -> dict[str, str]:
+    return {str(key).replace("_", " "): _fact(value) for key, value in facts.items()}
+
+
 def _fact(value: Any) -> str:
     if isinstance(value, Mapping):
-        items: Mapping[Any, Any] = value
-        return ", ".join(f"{key} {_fact(item)}" for key, item in items.items())
+        return ", ".join(f"{key} {_fact(item)}" for key, item in cast("Json", value).items())
     return plain(value) if isinstance(value, float) else str(value)
 
 

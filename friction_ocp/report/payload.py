@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from friction_ocp.plots.curves import curve_label
 from friction_ocp.plots.numbers import unit_text
+from friction_ocp.plots.reading import Json
 from friction_ocp.plots.series import ChannelColumns, rounded, traces_of
 
 _ESCAPES = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026"}
@@ -39,7 +40,7 @@ def recording_payload(channels: Mapping[str, ChannelColumns], units: Mapping[str
     ]
 
 
-def friction_payload(curves: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def friction_payload(curves: Sequence[Json]) -> list[dict[str, Any]]:
     """Return one plot a shaft, in order, with its curves."""
     plots: list[dict[str, Any]] = []
     for shaft in dict.fromkeys(str(curve["shaft"]) for curve in curves):
@@ -57,7 +58,7 @@ def friction_payload(curves: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
     return plots
 
 
-def residual_payload(channels: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+def residual_payload(channels: Mapping[str, Json]) -> list[dict[str, Any]]:
     """Return the autocorrelations of one recording."""
     return [
         {
@@ -71,7 +72,7 @@ def residual_payload(channels: Mapping[str, Mapping[str, Any]]) -> list[dict[str
     ]
 
 
-def _columns(curve: Mapping[str, Any]) -> dict[str, list[float | None]]:
+def _columns(curve: Json) -> dict[str, list[float | None]]:
     return {key: _rounded(curve.get(key)) for key in ("speed", "torque", "lower", "upper")}
 
 
@@ -85,7 +86,7 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        return {str(key): _finite(item) for key, item in cast("Mapping[Any, Any]", value).items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+        return [_finite(item) for item in cast("Sequence[Any]", value)]
     return value

@@ -140,6 +140,7 @@
     const plot = document.createElement("div");
     heading.textContent = figure.title;
     plot.className = "plot";
+    plot.dataset.height = figure.height;
     plot.setAttribute("role", "img");
     plot.setAttribute("aria-label", figure.label);
     element.append(heading, plot);
@@ -237,8 +238,8 @@
     root.classList.toggle("printing", printing);
     document.querySelectorAll("details").forEach((details) => { details.open = printing; });
     document.querySelectorAll(".plot").forEach((plot) => repaint(plot, printing
-      ? { width: plot.closest(".pairs") ? 325 : 680 }
-      : { width: null, autosize: true }));
+      ? { width: plot.closest(".pairs") ? 325 : 680, height: 0.86 * plot.dataset.height }
+      : { width: null, height: Number(plot.dataset.height), autosize: true }));
   };
   window.addEventListener("beforeprint", () => onPaper(true));
   window.addEventListener("afterprint", () => onPaper(false));

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from friction_ocp.plots.numbers import is_number, plain, significant, unit_text
+from friction_ocp.plots.reading import Json, objects, part
 
 _NAMED = 3  # channels named before the rest is counted
 
 
-def verdict_sentence(result: Mapping[str, Any]) -> str:
+def verdict_sentence(result: Json) -> str:
     """Say whether the solver converged, how well the free run explains the machine, and what is determined."""
-    sentences = [_status(result), _fit(result.get("fit") or {}), _determined(result.get("parameters") or {})]
+    sentences = [_status(result), _fit(part(result, "fit")), _determined(objects(result, "parameters"))]
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _status(result: Mapping[str, Any]) -> str:
+def _status(result: Json) -> str:
     if result.get("status") == "converged":
         return "Converged."
     message = str(result.get("message") or "the solver gave no reason").strip().rstrip(".")
     return f"Not converged: {message}. What follows is the last iterate, not an answer."
 
 
-def _fit(fit: Mapping[str, Any]) -> str:
-    train, validation = fit.get("train") or {}, fit.get("validation") or {}
+def _fit(fit: Json) -> str:
+    train, validation = objects(fit, "train"), objects(fit, "validation")
     channels = [name for name in train if is_number(train[name].get("mae"))]
     if not channels:
         return ""
@@ -40,7 +40,7 @@ def _fit(fit: Mapping[str, Any]) -> str:
     return f"{run} explains {explained} (mean abs) on training{tail}."
 
 
-def _determined(parameters: Mapping[str, Any]) -> str:
+def _determined(parameters: Mapping[str, Json]) -> str:
     sound = sum(parameter.get("verdict") == "ok" for parameter in parameters.values())
     if not parameters:
         return ""
@@ -49,7 +49,7 @@ def _determined(parameters: Mapping[str, Any]) -> str:
     return f"{sound} of {len(parameters)} parameters are determined."
 
 
-def _error(channel: Mapping[str, Any]) -> str:
+def _error(channel: Json) -> str:
     return f"{significant(channel.get('mae'), 2)} {unit_text(str(channel.get('unit', '')))}".rstrip()
 
 

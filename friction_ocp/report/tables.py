@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from friction_ocp.plots.numbers import NOTHING, is_number, percent, plain, significant, to_resolution, unit_text
 from friction_ocp.plots.palette import NEGATIVE, POSITIVE, VERDICT_WORDS
+from friction_ocp.plots.reading import Json, objects, part, rows
 
 SPLITS = {"train": "training", "validation": "validation"}
 """What the keys of the result are called on the page."""
@@ -66,12 +67,12 @@ class CorrelationCell:
     strong: bool
 
 
-def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[ParameterRow]:
+def parameter_rows(parameters: Mapping[str, Json]) -> list[ParameterRow]:
     """Return the rows of the parameter table in the order of the result."""
     return [_parameter_row(name, parameter) for name, parameter in parameters.items()]
 
 
-def _parameter_row(name: str, parameter: Mapping[str, Any]) -> ParameterRow:
+def _parameter_row(name: str, parameter: Json) -> ParameterRow:
     value, std_error = parameter.get("value"), parameter.get("std_error")
     verdict = str(parameter.get("verdict", ""))
     unit = str(parameter.get("unit", ""))
@@ -80,20 +81,20 @@ def _parameter_row(name: str, parameter: Mapping[str, Any]) -> ParameterRow:
         unit=unit,
         unit_text=unit_text(unit),
         value=Cell(to_resolution(value, std_error), _key(value)),
-        interval=_interval(parameter.get("interval95"), std_error),
+        interval=_interval(rows(parameter, "interval95"), std_error),
         std_error=Cell(significant(std_error, 2), _key(std_error)),
         guess=Cell(plain(parameter.get("guess")), _key(parameter.get("guess"))),
         verdict=verdict if verdict in _SIGNS else "other",
         word=VERDICT_WORDS.get(verdict, verdict or NOTHING),
         sign=_SIGNS.get(verdict, ""),
         rank=_ORDER.index(verdict) if verdict in _ORDER else len(_ORDER),
-        traded_with=tuple(str(other) for other in parameter.get("traded_with") or ()),
+        traded_with=tuple(str(other) for other in rows(parameter, "traded_with")),
     )
 
 
-def _interval(bounds: Any, std_error: Any) -> Cell:
+def _interval(bounds: Sequence[Any], std_error: Any) -> Cell:
     """Return both bounds, sorted by the width between them; an open side is infinite."""
-    if not bounds or not any(is_number(bound) for bound in bounds):
+    if len(bounds) != 2 or not any(is_number(bound) for bound in bounds):
         return Cell(NOTHING)
     first, last = (
         to_resolution(bound, std_error) if is_number(bound) else sign + "∞"
@@ -107,28 +108,29 @@ def _key(value: Any) -> float | None:
     return float(value) if is_number(value) else None
 
 
-def fit_rows(fit: Mapping[str, Any]) -> dict[str, list[FitRow]]:
+def fit_rows(fit: Json) -> dict[str, list[FitRow]]:
     """Return the training and the validation row of each channel."""
-    rows: dict[str, list[FitRow]] = {}
+    table: dict[str, list[FitRow]] = {}
     for key, split in SPLITS.items():
-        for channel, errors in (fit.get(key) or {}).items():
-            rows.setdefault(channel, []).append(_fit_row(split, errors))
-    return rows
+        for channel, errors in objects(fit, key).items():
+            table.setdefault(channel, []).append(_fit_row(split, errors))
+    return table
 
 
-def fit_rows_by_recording(fit: Mapping[str, Any]) -> dict[str, list[FitRow]]:
+def fit_rows_by_recording(fit: Json) -> dict[str, list[FitRow]]:
     """Return the rows of each channel's recordings; where there is only a number, it is the rms."""
-    rows: dict[str, list[FitRow]] = {}
+    table: dict[str, list[FitRow]] = {}
     for key, split in SPLITS.items():
-        for channel, errors in (fit.get(key) or {}).items():
+        for channel, errors in objects(fit, key).items():
             shared = {"unit": errors.get("unit"), "noise_source": errors.get("noise_source")}
-            for recording, part in (errors.get("by_recording") or {}).items():
-                own: Mapping[str, Any] = part if isinstance(part, Mapping) else {"rms": part}
-                rows.setdefault(channel, []).append(_fit_row(f"{recording} ({split})", {**shared, **own}))
-    return rows
+            by_recording = part(errors, "by_recording")
+            for recording, found in by_recording.items():
+                own = part(by_recording, recording) or {"rms": found}
+                table.setdefault(channel, []).append(_fit_row(f"{recording} ({split})", {**shared, **own}))
+    return table
 
 
-def _fit_row(recordings: str, errors: Mapping[str, Any]) -> FitRow:
+def _fit_row(recordings: str, errors: Json) -> FitRow:
     return FitRow(
         recordings=recordings,
         unit_text=unit_text(str(errors.get("unit") or "")),
@@ -141,12 +143,12 @@ def _fit_row(recordings: str, errors: Mapping[str, Any]) -> FitRow:
     )
 
 
-def correlation_rows(correlation: Mapping[str, Any]) -> list[tuple[str, list[CorrelationCell]]]:
+def correlation_rows(correlation: Json) -> list[tuple[str, list[CorrelationCell]]]:
     """Return name and cells of each row of the matrix."""
-    names = [str(name) for name in correlation.get("names") or ()]
+    names = [str(name) for name in rows(correlation, "names")]
     return [
         (name, [_correlation_cell(value) for value in row])
-        for name, row in zip(names, correlation.get("matrix") or (), strict=True)
+        for name, row in zip(names, rows(correlation, "matrix"), strict=True)
     ]
 
 

@@ -14,6 +14,9 @@ IntArray = npt.NDArray[np.int64]
 
 COMPUTE, APPLY = 1, 2
 
+OWN_RATE = 0.05
+"""Relative deviation of sampling intervals from the controller's within which both share a clock."""
+
 
 @dataclass(frozen=True)
 class InputSignal:
@@ -47,15 +50,24 @@ class Grid:
         return np.append(np.diff(self.time), 0.0)
 
 
-def controller_ticks(controller: Controller | None, start: float, end: float) -> tuple[FloatArray, FloatArray]:
-    """Return the times at which a sampled controller computes and at which its commands are applied."""
+def controller_ticks(controller: Controller | None, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the times at which a sampled controller computes and at which its commands are applied.
+
+    Where the recording was sampled at the controller's own rate, its samples are the ticks: a clock that runs some
+    parts per million fast or slow does not slip against the controller.
+    """
     if controller is None or controller.sample_time is None:
         return np.empty(0), np.empty(0)
-    count = int(np.floor((end - start) / controller.sample_time + 1e-9)) + 1
-    compute = start + controller.sample_time * np.arange(count)
-    return compute, (compute + controller.delay)[compute + controller.delay <= end] if controller.delay > 0 else (
-        np.empty(0)
-    )
+    start, end = float(samples[0]), float(samples[-1])
+    steps = np.diff(samples)
+    if np.all(np.abs(steps - controller.sample_time) < OWN_RATE * controller.sample_time):
+        compute = samples
+    else:
+        compute = start + controller.sample_time * np.arange(
+            int(np.floor((end - start) / controller.sample_time + 1e-9)) + 1
+        )
+    apply = compute + controller.delay if controller.delay > 0 else np.empty(0)
+    return compute, apply[apply <= end]
 
 
 def _merge(times: list[FloatArray], tolerance: float) -> FloatArray:
@@ -75,7 +87,7 @@ def build_grid(
     `samples` (n,) s are the times at which outputs are needed; `max_step` s bounds the integrator step.
     """
     start, end = float(samples[0]), float(samples[-1])
-    compute, apply = controller_ticks(controller, start, end)
+    compute, apply = controller_ticks(controller, samples)
     jumps = [signal.time for signal in inputs if signal.zero_hold]
     inside = [times[(times >= start) & (times <= end)] for times in (samples, compute, apply, *jumps)]
     tolerance = 1e-9 * max(end - start, 1e-6)

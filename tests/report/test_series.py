@@ -58,7 +58,7 @@ def test_a_slow_channel_on_a_fast_axis_is_one_curve() -> None:
     assert np.isfinite(trace.measured).all()
 
 
-@given(arrays(np.float64, st.integers(0, 50), elements=values))
+@given(arrays(np.float64, st.integers(0, 50), elements=values.filter(lambda value: not 0 < abs(value) < 1e-250)))
 def test_rounding_is_finer_than_a_pixel(signal: FloatArray) -> None:
     """No value moves by more than a hundred-thousandth of the range; what is missing is None."""
     short = rounded(signal)

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from friction_ocp.drive.parts import Channel, Drive, Motor
+from friction_ocp.drive.parts import Channel, Drive, Motor, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import bind_drive, drive_leaves
-from friction_ocp.errors import FrictionOcpError
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.expressions import resolve_ties
-from friction_ocp.parameters import Free, Leaf, Tie
+from friction_ocp.parameters import Free, Leaf, Tie, leaves
 from friction_ocp.recording.conditioning import smooth_motion
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
@@ -40,6 +41,8 @@ class Case:
     """A problem and what the rules derive from it, each only once."""
 
     problem: Problem
+    recording_places: tuple[str, ...] = ()
+    """Where the recordings stand in the file, if some of those there could not be read."""
 
     @property
     def drive(self) -> Drive:
@@ -59,7 +62,7 @@ class Case:
     def numbers(self) -> Mapping[str, float]:
         """Every number of the drive by its path: known, guessed or tied; NaN where it cannot be had."""
         values = {path: leaf.value for path, leaf in self.leaves.items()}
-        table = {path: float(_start(value)) for path, value in values.items() if not isinstance(value, Tie)}
+        table = {path: _start(value) for path, value in values.items() if not isinstance(value, Tie)}
         ties = {path: value.expr for path, value in values.items() if isinstance(value, Tie)}
         try:
             return resolve_ties(ties, table)
@@ -74,7 +77,7 @@ class Case:
     @cached_property
     def topology(self) -> Topology:
         """Which shafts move together; raises FrictionOcpError where rigid joints form a loop."""
-        return topology(self.bound)
+        return self._joined(self.bound.transmissions)
 
     def written(self, path: str) -> str:
         """Return a number with its name and unit: tau_c = 0.45 N m."""
@@ -82,60 +85,112 @@ class Case:
         return f"{path.rpartition('.')[2]} = {quantity_text(self.numbers[path], unit)}"
 
     def place(self, path: str) -> str:
-        """Return where in the file the number or part with this path stands."""
-        best = max((part for part in self._places if part == path or path.startswith(f"{part}.")), key=len, default="")
-        rest = path.removeprefix(best).strip(".").split(".")
-        keys = "".join(f"[{key}]" if key.isdigit() else f".{key}" for key in rest if key)
-        return f"{self._place_of(best, path)}{keys}" if best else path
-
-    def _place_of(self, part: str, path: str) -> str:
-        """A motor may bear the name of its shaft; the keys tell them apart."""
-        places = self._places[part]
-        key = path.removeprefix(part).strip(".").partition(".")[0]
-        of_shaft = key in ("inertia", "friction", "gravity", "external_torque")
-        of_channel = key in ("gain", "offset", "delay")
-        wanted = "drive.shafts" if of_shaft else "channels" if of_channel else "drive.motor"
-        return next((place for place in places if place.startswith(wanted)), places[0])
+        """Return where in the file the number with this path stands."""
+        return self._places.get(path, path)
 
     @cached_property
-    def _places(self) -> Mapping[str, list[str]]:
-        places: dict[str, list[str]] = {"controller": ["controller"]}
-        named = [
-            *((item.name, f"drive.shafts[{k}]") for k, item in enumerate(self.drive.shafts)),
-            *((item.name, f"drive.transmissions[{k}]") for k, item in enumerate(self.drive.transmissions)),
-            *((item.name, self.place_of_motor(item)) for item in self.drive.motors),
-            *((item.name, f"channels.{item.name}") for item in self.drive.channels),
+    def _places(self) -> Mapping[str, str]:
+        drive = self.drive
+        parts: list[tuple[Any, str, str]] = [
+            *((item, item.name, f"drive.shafts[{k}]") for k, item in enumerate(drive.shafts)),
+            *((item, item.name, f"drive.transmissions[{k}]") for k, item in enumerate(drive.transmissions)),
+            *((item, item.name, self.place_of_motor(item)) for item in drive.motors),
+            *((item, item.name, f"channels.{item.name}") for item in drive.channels),
         ]
-        for name, place in named:
-            places.setdefault(name, []).append(place)
-        return places
+        if drive.controller is not None:
+            parts.append((drive.controller, "controller", "controller"))
+        return {
+            leaf.path: place + re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", leaf.path.removeprefix(name))
+            for part, name, place in parts
+            for leaf in leaves(part, name)
+        }
 
     def place_of_motor(self, motor: Motor) -> str:
         """Return where in the file a motor stands; a single one is taken to be `drive.motor`."""
         motors = self.drive.motors
         return "drive.motor" if len(motors) == 1 else f"drive.motors[{motors.index(motor)}]"
 
-    def place_of_recording(self, use: RecordingUse) -> str:
-        """Return where in the file a recording stands."""
-        for kind, uses in (("train", self.problem.train), ("validation", self.problem.validation)):
-            for k, other in enumerate(uses):
-                if other is use:
-                    return f"recordings.{kind}[{use.place if use.place is not None else k}]"
-        return "recordings"
+    def uses(self) -> Iterator[tuple[str, RecordingUse]]:
+        """Yield every recording, training first, and where it stands in the file."""
+        problem = self.problem
+        places = self.recording_places or (
+            *(f"recordings.train[{k}]" for k in range(len(problem.train))),
+            *(f"recordings.validation[{k}]" for k in range(len(problem.validation))),
+        )
+        for place, use in zip(places, problem.recordings, strict=True):
+            yield place, use
 
-    def recorded(self, channel: Channel) -> Iterator[tuple[RecordingUse, RecordedChannel]]:
-        """Yield the recordings that hold a channel, training first."""
-        for use in self.problem.recordings:
-            if channel.name in use.recording.channels:
-                yield use, use.recording.channels[channel.name]
+    def at_recording(self, place: str, use: RecordingUse) -> str:
+        """Return file, place and recording, as findings name them."""
+        return self.at(f"{place}: {use.recording.path or use.name}")
 
-    def motion(self, shaft: str, use: RecordingUse) -> Motion | None:
-        """Return the motion of a shaft from a channel that sees it rigidly; None where there is none."""
-        group_of, speed_ratio = self.topology.group_of, self.topology.speed_ratio
+    def recorded(self) -> Iterator[tuple[str, Channel, RecordedChannel]]:
+        """Yield every channel of the problem in every recording that has it, and where that stands."""
+        for place, use in self.uses():
+            for channel in self.drive.channels:
+                if channel.name in use.recording.channels:
+                    yield self.at_recording(place, use), channel, use.recording.channels[channel.name]
+
+    def motion(self, shaft: str, use: RecordingUse, rigidly: bool = False) -> Motion | None:
+        """Return the motion of a shaft from a channel that sees it, over springs as if they were rigid.
+
+        `rigidly` leaves the springs out. None where no channel sees the shaft.
+        """
+        joined = self.topology if rigidly else self._without_springs
         for signal in ("omega", "theta"):
             for channel in self.drive.channels:
-                same = channel.signal == signal and group_of.get(channel.part) == group_of[shaft]
-                if same and channel.name in use.recording.channels:
-                    seen = self._seen(channel, use)
-                    return None if seen is None else seen.through(float(speed_ratio[shaft] / speed_ratio[channel.part]))
+                same = channel.signal == signal and joined.group_of.get(channel.part) == joined.group_of[shaft]
+                seen = self._seen(channel, use) if same else None
+                if seen is not None:
+                    return seen.through(float(joined.speed_ratio[shaft] / joined.speed_ratio[channel.part]))
         return None
+
+    @cached_property
+    def _without_springs(self) -> Topology:
+        try:
+            return self._joined(tuple(replace(item, stiffness=None) for item in self.bound.transmissions))
+        except FrictionOcpError:
+            return self.topology
+
+    def _joined(self, transmissions: tuple[Transmission, ...]) -> Topology:
+        known = tuple(replace(item, ratio=item.ratio or np.nan) for item in transmissions)
+        return topology(replace(self.bound, transmissions=known))
+
+    def _seen(self, channel: Channel, use: RecordingUse) -> Motion | None:
+        """Return the motion that a channel shows at the guesses of its gain and offset."""
+        key = (channel.name, id(use))
+        if key not in self._motions:
+            self._motions[key] = self._undo(channel, use)
+        return self._motions[key]
+
+    @cached_property
+    def _motions(self) -> dict[tuple[str, int], Motion | None]:
+        return {}
+
+    def _undo(self, channel: Channel, use: RecordingUse) -> Motion | None:
+        recorded = use.recording.channels.get(channel.name)
+        gain, offset = (self.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
+        if recorded is None or not _is_usable(recorded) or not abs(gain) > 0:
+            return None
+        value, slope, _ = smooth_motion(recorded.time, (recorded.values - offset) / gain)
+        if not np.all(np.isfinite(slope)):
+            return None
+        return Motion(recorded.time, value, slope) if channel.signal == "theta" else Motion(recorded.time, None, value)
+
+
+def _is_usable(recorded: RecordedChannel) -> bool:
+    if recorded.time.shape != recorded.values.shape or not np.all(np.diff(recorded.time) > 0):
+        return False
+    return bool(np.count_nonzero(np.isfinite(recorded.values)) >= 5)
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """Return a number with its unit; the unit of a plain number is left out."""
+    return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+
+
+def _start(value: Any) -> float:
+    return float(value.guess if isinstance(value, Free) else value)
+
+
+Rule = Callable[[Case], Iterator[Finding]]

@@ -1,0 +1,205 @@
+"""Rules about the numbers of a drive: bounds, signs, orders, and the expressions that tie them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from friction_ocp.drive.units import unit_of
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.expressions import closest, parse, resolve_ties
+from friction_ocp.friction.law import AbstractFrictionLaw, Direction
+from friction_ocp.parameters import Free, Tie
+from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
+
+_POSITIVE = {"resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"}
+_NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash"}
+_NOT_ZERO = {"ratio", "torque_constant", "gain"}
+_DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
+
+
+def bounds_are_in_order(case: Case) -> Iterator[Finding]:
+    """The lower bound lies below the upper one."""
+    for path, value, unit in _fitted(case):
+        if value.min >= value.max:
+            low, high = quantity_text(value.min, unit), quantity_text(value.max, unit)
+            swapped = "is above" if value.min > value.max else "equals"
+            remedy = "swap them" if value.min > value.max else "write a plain number to keep it fixed"
+            yield Finding(case.at(case.place(path)), f"min = {low} {swapped} max = {high}", "min below max", remedy)
+
+
+def guesses_are_inside_bounds(case: Case) -> Iterator[Finding]:
+    """The fit starts inside the bounds."""
+    for path, value, unit in _fitted(case):
+        if value.min < value.max and not value.min <= value.guess <= value.max:
+            outside = f"guess = {quantity_text(value.guess, unit)} is outside its bounds"
+            allowed = f"{quantity_text(value.min, unit)} to {quantity_text(value.max, unit)}"
+            yield Finding(case.at(case.place(path)), outside, allowed, "move the guess or the bounds")
+
+
+def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
+    """Stiffness is positive, damping not negative, a ratio not zero."""
+    for path, number in case.numbers.items():
+        key = next(part for part in reversed(path.split(".")) if part not in _DIRECTIONS and not part.isdigit())
+        impossible = [
+            (key in _POSITIVE and number <= 0, "must be positive"),
+            (key in _NOT_NEGATIVE and number < 0, "must not be negative"),
+            (key in _NOT_ZERO and number == 0, "must not be zero"),
+        ]
+        for _, allowed in (item for item in impossible if item[0]):
+            yield Finding(case.at(case.place(path)), case.written(path), allowed)
+
+
+def inertias_are_positive(case: Case) -> Iterator[Finding]:
+    """A body has inertia, unless it is rigidly joined to one that has."""
+    for shaft in case.drive.shafts:
+        path = f"{shaft.name}.inertia"
+        group = case.topology.members(case.topology.group_of[shaft.name])
+        carried = sum(case.numbers[f"{name}.inertia"] for name in group) > 0
+        if case.numbers[path] < 0 or (case.numbers[path] == 0 and not carried):
+            yield Finding(case.at(case.place(path)), case.written(path), "an inertia is positive")
+
+
+def breakaway_is_above_coulomb(case: Case) -> Iterator[Finding]:
+    """tau_s, the torque at standstill, is not below tau_c."""
+    for path in case.numbers:
+        stem, found, direction = path.partition(".tau_s")
+        coulomb = next((item for item in (f"{stem}.tau_c{direction}", f"{stem}.tau_c") if item in case.numbers), None)
+        if found and coulomb is not None and case.numbers[path] < case.numbers[coulomb]:
+            what = f"{_short(case, path)} is below {_short(case, coulomb)}"
+            allowed = "breakaway must be >= Coulomb torque"
+            yield Finding(case.at(case.place(path).partition(".tau_s")[0]), what, allowed)
+
+
+def _short(case: Case, path: str) -> str:
+    key = path.partition(".friction.")[2]
+    return f"{key} = {quantity_text(case.numbers[path], unit_of(case.leaves[path], case.drive))}"
+
+
+def polylines_have_their_breaks(case: Case) -> Iterator[Finding]:
+    """k slopes meet at k - 1 break speeds, which rise."""
+    for k, law in enumerate(shaft.friction.law for shaft in case.bound.shafts):
+        if not hasattr(law, "slopes") or not hasattr(law, "breaks"):
+            continue
+        where = case.at(f"drive.shafts[{k}].friction.breaks")
+        slopes, breaks = len(getattr(law, "slopes")), len(getattr(law, "breaks"))  # noqa: B009
+        if breaks != slopes - 1:
+            what = f"there are {breaks} breaks for {slopes} slopes"
+            yield Finding(where, what, f"{max(slopes - 1, 0)} breaks: one fewer than slopes")
+        speeds = {tuple(_breaks(law, direction)) for direction in _DIRECTIONS}
+        for several in speeds:
+            if any(not after > before for before, after in zip((0.0, *several), several, strict=False)):
+                shown = ", ".join(f"{speed:g}" for speed in several)
+                yield Finding(where, f"the breaks are {shown}", "positive speeds that rise")
+
+
+def _breaks(law: AbstractFrictionLaw, direction: Direction) -> tuple[float, ...]:
+    breaks: tuple[float, ...] = getattr(law.along(direction), "breaks")  # noqa: B009
+    return () if np.isnan(breaks).any() else breaks
+
+
+def load_dependence_has_a_load(case: Case) -> Iterator[Finding]:
+    """Only a shaft beside a transmission transmits a torque on which its friction could depend."""
+    ends = {name for item in case.drive.transmissions for name in (item.from_shaft, item.to_shaft)}
+    for k, shaft in enumerate(case.drive.shafts):
+        if shaft.friction.load is not None and shaft.name not in ends:
+            what = f"friction of '{shaft.name}' depends on load, and there is no transmission beside it"
+            yield Finding(case.at(f"drive.shafts[{k}].friction.load"), what, remedy="add the shaft that loads it")
+
+
+def load_stribeck_has_a_speed(case: Case) -> Iterator[Finding]:
+    """A Stribeck part that grows with load needs a law with a Stribeck speed."""
+    for k, shaft in enumerate(case.drive.shafts):
+        load, law = shaft.friction.load, type(shaft.friction.law)
+        if load is not None and load.stribeck != 0.0 and law.weakening is AbstractFrictionLaw.weakening:
+            what = f"law '{law.name}' has no Stribeck speed for load.stribeck"
+            yield Finding(
+                case.at(f"drive.shafts[{k}].friction.load.stribeck"), what, "laws with omega_s: stribeck, lugre"
+            )
+
+
+def bristles_are_passive(case: Case) -> Iterator[Finding]:
+    """A LuGre model that can give energy back is doubtful. Source: Barahanov & Ortega 2000."""
+    for k, shaft in enumerate(case.bound.shafts):
+        for law in {shaft.friction.law.along(direction) for direction in _DIRECTIONS}:
+            if not all(hasattr(law, key) for key in ("sigma1", "sigma2", "tau_s", "tau_c")):
+                continue
+            tau_c, tau_s, sigma1, sigma2 = (getattr(law, key) for key in ("tau_c", "tau_s", "sigma1", "sigma2"))
+            limit = sigma1 * (tau_s - tau_c) / tau_c if tau_c > 0 else 0.0
+            if sigma1 > 0 and sigma2 <= limit and tau_s > tau_c:
+                what = f"sigma2 = {sigma2:g} is not above sigma1 (tau_s - tau_c)/tau_c = {limit:g}"
+                allowed = "a passive LuGre model has sigma2 > sigma1 (tau_s - tau_c)/tau_c"
+                where = case.at(f"drive.shafts[{k}].friction")
+                yield Finding(where, what, allowed, "lower sigma1", severity="warning")
+
+
+def ties_can_be_computed(case: Case) -> Iterator[Finding]:
+    """A tie is an expression over numbers that exist, and no ties go in a circle."""
+    ties = {path: leaf.value.expr for path, leaf in case.leaves.items() if isinstance(leaf.value, Tie)}
+    plain = {path: number for path, number in case.numbers.items() if path not in ties}
+    readable: dict[str, str] = {}
+    for path, text in ties.items():
+        try:
+            parse(text, tuple(case.leaves), case.at(f"{case.place(path)}.expr"))
+            readable[path] = text
+        except FrictionOcpError as error:
+            yield from error.findings
+    if len(readable) == len(ties):
+        yield from _unresolved(case, ties, plain)
+
+
+def _unresolved(case: Case, ties: Mapping[str, str], plain: Mapping[str, float]) -> Iterator[Finding]:
+    try:
+        resolve_ties(ties, plain)
+    except FrictionOcpError as error:
+        for finding in error.findings:
+            where = case.at(f"{case.place(finding.where)}.expr")
+            yield Finding(where, finding.what, finding.allowed, finding.remedy)
+
+
+def constraints_compare_numbers(case: Case) -> Iterator[Finding]:
+    """A constraint is an inequality between numbers that exist."""
+    scoped = [path for path, value, _ in _fitted(case) if value.scope == "recording"]
+    names = [*case.leaves, *(f"{path}@{use.name}" for path in scoped for use in case.problem.train)]
+    for k, text in enumerate(case.problem.constraints):
+        where = case.at(f"constraints[{k}]")
+        try:
+            if not parse(text, names, where).comparison:
+                yield Finding(where, f"'{text}' is not an inequality", "two values joined by <= or >=")
+        except FrictionOcpError as error:
+            yield from error.findings
+
+
+def settings_name_numbers(case: Case) -> Iterator[Finding]:
+    """What is `set` beside a recording is a number of the drive."""
+    for place, use in case.uses():
+        for path in use.set:
+            if path not in case.leaves:
+                where, names = case.at(f"{place}.set"), list(case.leaves)
+                yield Finding(where, f"unknown parameter '{path}'", "paths such as load.inertia", closest(path, names))
+
+
+def _fitted(case: Case) -> Iterator[tuple[str, Free, str]]:
+    for path, leaf in case.leaves.items():
+        if isinstance(leaf.value, Free):
+            yield path, leaf.value, unit_of(leaf, case.drive)
+
+
+VALUES: tuple[Rule, ...] = (
+    bounds_are_in_order,
+    guesses_are_inside_bounds,
+    numbers_have_possible_signs,
+    inertias_are_positive,
+    breakaway_is_above_coulomb,
+    polylines_have_their_breaks,
+    load_stribeck_has_a_speed,
+    bristles_are_passive,
+)
+WHOLE: tuple[Rule, ...] = (
+    load_dependence_has_a_load,
+    ties_can_be_computed,
+    constraints_compare_numbers,
+    settings_name_numbers,
+)
+"""Rules about what is not there."""

@@ -1,0 +1,193 @@
+"""Results as the documents that files hold: plain dictionaries, lists, numbers and text."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from friction_ocp.estimation.curves import FrictionCurve
+from friction_ocp.estimation.estimate import Estimate, ParameterEstimate, Simulation
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.score import Errors, FreeRun
+from friction_ocp.estimation.whiteness import Whiteness
+from friction_ocp.quantities import si_unit
+from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries, StateSeries
+
+FORMAT = "friction-ocp-result/1"
+SIMULATION_FORMAT = "friction-ocp-simulation/1"
+
+
+def _number(value: float) -> float | None:
+    """Return a float that JSON can hold; None for NaN and infinity."""
+    return float(value) if math.isfinite(value) else None
+
+
+def estimate_document(estimate: Estimate) -> dict[str, Any]:
+    """Return the content of result.json for an identification."""
+    return {
+        "format": FORMAT,
+        "status": "converged" if estimate.converged else "not_converged",
+        "message": estimate.message,
+        **_heading(estimate.problem),
+        "warnings": list(estimate.warnings),
+        "parameters": {item.name: _parameter(item) for item in estimate.parameters},
+        "fit": _fit(estimate.simulation),
+        "solver": {
+            "name": estimate.solver.name,
+            "iterations": estimate.solver.iterations,
+            "seconds": estimate.solver.seconds,
+            "build_seconds": estimate.solver.build_seconds,
+            "objective": _number(estimate.solver.objective),
+            "starts": estimate.solver.starts,
+        },
+        "covariance": {
+            "kind": estimate.uncertainty.kind,
+            "names": [item.name for item in estimate.parameters],
+            "matrix": _matrix(estimate.uncertainty.covariance),
+        },
+        "correlation": {
+            "names": [item.name for item in estimate.parameters],
+            "matrix": _matrix(estimate.uncertainty.correlation),
+        },
+        "friction_curves": [_curve(curve, estimate.problem) for curve in estimate.curves],
+        "residuals": {
+            recording: {channel: _whiteness(test) for channel, test in tests.items()}
+            for recording, tests in estimate.residuals.items()
+        },
+        "channel_units": dict(estimate.simulation.units),
+        "provenance": _provenance(estimate.problem),
+    }
+
+
+def simulation_document(simulation: Simulation) -> dict[str, Any]:
+    """Return the content of result.json for a simulation."""
+    return {
+        "format": SIMULATION_FORMAT,
+        "status": "simulated",
+        "message": "free-running simulation with the values of the problem file",
+        **_heading(simulation.problem),
+        "warnings": [],
+        "parameters": {},
+        "fit": _fit(simulation),
+        "channel_units": dict(simulation.units),
+        "provenance": _provenance(simulation.problem),
+    }
+
+
+def _heading(problem: Problem) -> dict[str, Any]:
+    return {
+        "title": problem.title,
+        "question": problem.question,
+        "problem": problem.path.name if problem.path else "",
+        "recordings": {
+            "train": [use.name for use in problem.train],
+            "validation": [use.name for use in problem.validation],
+        },
+    }
+
+
+def _parameter(item: ParameterEstimate) -> dict[str, Any]:
+    low, high = (_number(end) for end in item.interval95)
+    return {
+        "value": item.value,
+        "unit": item.unit,
+        "std_error": _number(item.std_error),
+        "interval95": None if low is None or high is None else [low, high],
+        "guess": item.guess,
+        "verdict": item.verdict.word,
+        "traded_with": list(item.verdict.traded_with),
+    }
+
+
+def _fit(simulation: Simulation) -> dict[str, Any]:
+    def table(errors: Mapping[str, tuple[Errors, Mapping[str, Errors]]]) -> dict[str, Any]:
+        return {
+            name: {
+                **_errors(whole),
+                "unit": simulation.units[name],
+                "noise_std": simulation.floors[name].std,
+                "noise_source": simulation.floors[name].source,
+                "by_recording": {recording: _errors(item) for recording, item in parts.items()},
+            }
+            for name, (whole, parts) in errors.items()
+        }
+
+    return {
+        "horizon_s": simulation.horizon_s,
+        "train": table(simulation.train_errors),
+        "validation": table(simulation.validation_errors),
+    }
+
+
+def _errors(errors: Errors) -> dict[str, float | None]:
+    names = ("rms", "mae", "relative", "relative_norm", "noise_ratio")
+    return {name: _number(getattr(errors, name)) for name in names}
+
+
+def _matrix(values: Any) -> list[list[float | None]]:
+    return [[_number(value) for value in row] for row in np.asarray(values)]
+
+
+def _curve(curve: FrictionCurve, problem: Problem) -> dict[str, Any]:
+    motion = problem.drive.shaft(curve.shaft).motion
+    return {
+        "shaft": curve.shaft,
+        "law": curve.law,
+        "load": curve.load,
+        "load_unit": si_unit("torque", motion),
+        "speed": curve.speed.tolist(),
+        "torque": curve.torque.tolist(),
+        "lower": curve.lower.tolist(),
+        "upper": curve.upper.tolist(),
+        "speed_unit": si_unit("speed", motion),
+        "torque_unit": si_unit("torque", motion),
+    }
+
+
+def _whiteness(test: Whiteness) -> dict[str, Any]:
+    return {
+        "lag_s": test.lag_s.tolist(),
+        "autocorrelation": test.autocorrelation.tolist(),
+        "band": test.band,
+        "p_value": test.p_value,
+        "white": test.white,
+    }
+
+
+def _provenance(problem: Problem) -> dict[str, Any]:
+    packages = ("friction-ocp", "casadi", "numpy", "scipy")
+    return {
+        **{name.replace("-", "_"): importlib.metadata.version(name) for name in packages},
+        "python": platform.python_version(),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seed": problem.estimation.seed,
+        "recordings": {use.name: use.recording.sha256 for use in problem.recordings},
+    }
+
+
+def simulation_series(simulation: Simulation) -> dict[str, RecordingSeries]:
+    """Return the content of result.h5: measured and simulated channels and states of every recording."""
+    runs = (*simulation.train, *simulation.validation)
+    return {run.name: _series(run, simulation) for run in runs}
+
+
+def _series(run: FreeRun, simulation: Simulation) -> RecordingSeries:
+    channels: dict[str, ChannelSeries] = {}
+    for column, (name, unit) in enumerate(simulation.units.items()):
+        at = np.isfinite(run.measured[:, column])
+        if at.any():
+            # a channel keeps the nodes between its first and last sample, missing ones as NaN
+            inside = slice(int(np.argmax(at)), at.size - int(np.argmax(at[::-1])))
+            channels[name] = ChannelSeries(
+                run.time[inside], run.measured[inside, column], run.simulated[inside, column], unit
+            )
+    states = {name: run.states[:, k] for k, name in enumerate(simulation.state_names)}
+    return RecordingSeries(channels, StateSeries(run.time, states))
+
+

@@ -1,0 +1,74 @@
+"""Results on disk: result.json, result.h5, report.html, figures; every file whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from friction_ocp.estimation.estimate import Estimate, Simulation
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.recording.result_series import RecordingSeries
+from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
+
+Arrays = dict[str, dict[str, dict[str, Any]]]
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file under a temporary name and rename it when it is complete."""
+    staged = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        write(staged)
+        staged.replace(path)
+    finally:
+        staged.unlink(missing_ok=True)
+
+
+def save(result: Estimate | Simulation, folder: str | Path) -> Path:
+    """Write everything that a command leaves behind and return the folder."""
+    target = Path(folder)
+    if isinstance(result, Estimate):
+        fitted = fitted_problem(result.problem, result.values, target)
+        write_results(target, estimate_document(result), simulation_series(result.simulation), fitted)
+    else:
+        write_results(target, simulation_document(result), simulation_series(result))
+    return target
+
+
+def fitted_problem(problem: Problem, values: Mapping[str, float], folder: Path) -> str | None:
+    """Return the text of fitted.yaml; None for a problem that did not come from a file."""
+    from friction_ocp.problem_file.dump import dump_problem
+
+    return None if problem.path is None else dump_problem(problem.path, values, folder)
+
+
+def write_results(
+    folder: Path, document: Mapping[str, Any], series: Mapping[str, RecordingSeries], fitted: str | None = None
+) -> None:
+    """Write result.json, result.h5, report.html, figures/ and, for a fit, fitted.yaml."""
+    from friction_ocp.plots.figures import write_figures
+    from friction_ocp.recording.hdf5 import write_result_series
+    from friction_ocp.report.page import write_report
+
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(document, indent=1, allow_nan=False)
+    write_whole(folder / "result.json", lambda path: path.write_text(text, encoding="utf-8"))
+    write_result_series(folder / "result.h5", series)
+    if fitted is not None:
+        write_whole(folder / "fitted.yaml", lambda path: path.write_text(fitted, encoding="utf-8"))
+    arrays = plain_arrays(series)
+    write_report(document, arrays, folder / "report.html")
+    write_figures(document, arrays, folder / "figures")
+
+
+def plain_arrays(series: Mapping[str, RecordingSeries]) -> Arrays:
+    """Return {recording: {channel: {time, measured, simulated}}} for reports and figures."""
+    return {
+        recording: {
+            name: {"time": channel.time, "measured": channel.measured, "simulated": channel.simulated}
+            for name, channel in content.channels.items()
+        }
+        for recording, content in series.items()
+    }

@@ -1,0 +1,136 @@
+"""The maps that a sweep loops over - step, output, controller tick - as CasADi functions with derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from friction_ocp.drive.stepping import SteppedDrive
+
+
+@dataclass(frozen=True)
+class SweepMap:
+    """One map in implicit form: its value depends on torques that equal `found`."""
+
+    name: str
+    arguments: tuple[ca.SX, ...]
+    """State, inputs, parameters, then what else the map needs."""
+    torques: ca.SX
+    """Symbols of the unknown torques; empty for an explicit map."""
+    value: ca.SX
+    found: ca.SX
+    start: ca.SX
+    """The torques as a function of the arguments alone."""
+
+    @property
+    def unknowns(self) -> int:
+        """How many torques are unknown."""
+        return self.torques.numel()
+
+    def function(self) -> ca.Function:
+        """Return (arguments, torques) -> value."""
+        return self._function(self.name, [self.value])
+
+    def newton(self) -> ca.Function:
+        """Return (arguments, torques) -> better torques, one step of Newton's method."""
+        slope = ca.SX.eye(self.unknowns) - ca.jacobian(self.found, self.torques)
+        return self._function(f"{self.name}_n", [self.torques - ca.solve(slope, self.torques - self.found)])
+
+    def derivative(self, active: Sequence[int]) -> ca.Function:
+        """Return (arguments, torques) -> value, Jacobian by state, Jacobian by active parameters, all dense.
+
+        The torques move with state and parameters as the implicit function theorem says.
+        """
+        by_state = self._total(self.arguments[0])
+        by_active = self._total(ca.vertcat(*[self.arguments[2][k] for k in active]))
+        return self._function(f"{self.name}_d", [self.value, by_state, by_active])
+
+    def explicit(self, function: ca.Function) -> ca.Function:
+        """Return a function of (arguments, torques) as one of the arguments alone."""
+        values = function.call([*self.arguments, *([self.start] if self.unknowns else [])], True, False)
+        return ca.Function(function.name(), list(self.arguments), values, {"cse": True})
+
+    def _total(self, by: ca.SX) -> ca.SX:
+        if by.numel() == 0:
+            return ca.SX(self.value.numel(), 0)
+        partial = ca.jacobian(self.value, by)
+        if not self.unknowns:
+            return partial
+        slope = ca.SX.eye(self.unknowns) - ca.jacobian(self.found, self.torques)
+        moved = ca.solve(slope, ca.jacobian(self.found, by))
+        return partial + ca.mtimes(ca.jacobian(self.value, self.torques), moved)
+
+    def _function(self, name: str, values: list[ca.SX]) -> ca.Function:
+        arguments = [*self.arguments, *([self.torques] if self.unknowns else [])]
+        return ca.Function(name, arguments, [ca.densify(value) for value in values], {"cse": True})
+
+
+def sweep_maps(drive: SteppedDrive, active: Sequence[int]) -> dict[str, SweepMap]:
+    """Return `step`, `output`, `tick` where the drive has ticks, and `now` where delays may be left out.
+
+    `now` is `output` with all sensor delays zero, which needs no acceleration; it exists unless a delay is fitted.
+    """
+    maps = {"step": _implicit("step", drive), "output": _implicit("output", drive)}
+    if drive.tick is not None:
+        arguments = _symbols(drive.tick)
+        maps["tick"] = _explicit("fo_tick", arguments, drive.tick.call(arguments, True, False)[0])
+    delays = delay_indices(drive)
+    if delays and not set(delays) & set(active):
+        maps["now"] = _without_delay(maps["output"], delays)
+    return maps
+
+
+def delay_indices(drive: SteppedDrive) -> tuple[int, ...]:
+    """Return where the parameters hold the delays of output channels."""
+    names = {f"{name}.delay" for name in drive.output_names}
+    return tuple(k for k, name in enumerate(drive.parameter_names) if name in names)
+
+
+def _symbols(function: ca.Function) -> list[ca.SX]:
+    return [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]  # pyright: ignore[reportArgumentType]
+
+
+def _explicit(name: str, arguments: Sequence[ca.SX], value: ca.SX) -> SweepMap:
+    none = ca.SX(0, 1)
+    return SweepMap(name, tuple(arguments), none, ca.cse(value), none, none)
+
+
+def _implicit(name: str, drive: SteppedDrive) -> SweepMap:
+    implicit = drive.implicit.get(name)
+    if implicit is None:
+        function: ca.Function = getattr(drive, name)
+        arguments = _symbols(function)
+        return _explicit(f"fo_{name}", arguments, function.call(arguments, True, False)[0])
+    *arguments, torques = _symbols(implicit.relation)
+    value, found = implicit.relation.call([*arguments, torques], True, False)
+    return _without_idle_torques(
+        SweepMap(
+            name=f"fo_{name}",
+            arguments=tuple(arguments),
+            torques=torques,
+            value=value,
+            found=found,
+            start=implicit.torques.call(arguments, True, False)[0],
+        )
+    )
+
+
+def _without_idle_torques(item: SweepMap) -> SweepMap:
+    """Make a map explicit whose value does not depend on the torques; simplify it before it is differentiated."""
+    if not ca.depends_on(item.value, item.torques):
+        return _explicit(item.name, item.arguments, item.value)
+    stacked = ca.cse(ca.vertcat(item.value, item.found))
+    split = item.value.numel()
+    return SweepMap(item.name, item.arguments, item.torques, stacked[:split], stacked[split:], item.start)
+
+
+def _without_delay(output: SweepMap, delays: tuple[int, ...]) -> SweepMap:
+    symbols = ca.vertcat(*[output.arguments[2][k] for k in delays])
+    value = ca.simplify(ca.substitute(output.value, symbols, ca.SX.zeros(len(delays))))
+    if not output.unknowns:
+        return _explicit("fo_now", output.arguments, value)
+    return _without_idle_torques(
+        SweepMap("fo_now", output.arguments, output.torques, value, output.found, output.start)
+    )

@@ -1,0 +1,204 @@
+"""One machine twice: the plant that simulates it independently, and the drive under test made from the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantShaft, Trajectory
+
+from friction_ocp.drive.parts import Channel, Controller, Drive, ExternalTorque, Gravity, Motor, Shaft, Transmission
+from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.registry import friction_laws
+from friction_ocp.parameters import Directional
+from friction_ocp.simulation.grid import InputSignal, build_grid
+from friction_ocp.simulation.sweep import Sweep
+
+PLANT_STEP = 2e-5
+
+FIELDS = {
+    "none": (),
+    "coulomb": ("tau_c",),
+    "viscous": ("viscous",),
+    "coulomb_viscous": ("tau_c", "viscous"),
+    "stribeck": ("tau_c", "tau_s", "omega_s", "viscous", "delta"),
+    "polyline": ("tau_c", "slopes", "breaks"),
+    "quadratic": ("tau_c", "viscous", "quadratic"),
+    "dahl": ("tau_c", "sigma0", "sigma2"),
+    "lugre": ("tau_c", "tau_s", "omega_s", "sigma0", "sigma1", "sigma2", "delta"),
+}
+
+
+def _by_direction(value: object) -> object:
+    return Directional(*value) if isinstance(value, tuple) else value
+
+
+def friction_of(friction: PlantFriction) -> FrictionElement:
+    """Return the friction under test with the plant's numbers."""
+    numbers: dict[str, object] = {}
+    for name in FIELDS[friction.law]:
+        value = getattr(friction, "viscous" if name == "sigma2" else name)
+        if name in ("slopes", "breaks"):
+            numbers[name] = tuple(_by_direction(item) for item in value)
+        else:
+            numbers[name] = _by_direction(friction.tau_c if value is None else value)
+    shares = (friction.load_coulomb, friction.load_stribeck, friction.load_viscous)
+    load = LoadDependence(*(_by_direction(share) for share in shares)) if any(shares) else None
+    return FrictionElement(friction_laws()[friction.law](**numbers), load)
+
+
+def _shaft(shaft: PlantShaft) -> Shaft:
+    return Shaft(
+        shaft.name,
+        shaft.inertia,
+        friction_of(shaft.friction),
+        Gravity(*shaft.gravity) if any(shaft.gravity) else None,
+        ExternalTorque(shaft.external_torque) if shaft.external_torque else None,
+    )
+
+
+def _motor(motor: PlantMotor) -> Motor:
+    voltage = motor.drive == "voltage"
+    return Motor(
+        motor.name,
+        motor.shaft,
+        motor.torque_constant,
+        motor.resistance if voltage else None,
+        (motor.inductance or None) if voltage else None,
+        motor.share,
+    )
+
+
+def _controller(controller: PlantController, output: str) -> Controller:
+    return Controller(
+        type=controller.type,
+        feedback=controller.feedback,
+        output=output,
+        kp=controller.kp,
+        ki=controller.ki,
+        kd=controller.kd,
+        sample_time=controller.sample_time,
+        delay=controller.delay,
+        saturation=controller.saturation if np.all(np.isfinite(controller.saturation)) else None,
+        anti_windup=controller.anti_windup,
+        derivative=controller.derivative,
+    )
+
+
+def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
+    """Return the drive under test: inputs by their signals, the plant's sensors and all angles and speeds as outputs."""
+    driven = [Channel(name, name, "input") for name in inputs]
+    sensors = [Channel(s.name, s.measures, "output", s.gain, s.offset, s.delay, s.resolution) for s in plant.sensors]
+    seen = [f"{shaft.name}.{signal}" for shaft in plant.shafts for signal in ("theta", "omega")]
+    seen = [name for name in seen if name not in inputs]
+    if any(c.type == "duty" for c in plant.controllers):
+        driven.append(Channel("supply", f"{plant.motors[0].name}.supply_voltage", "input"))
+    return Drive(
+        shafts=tuple(_shaft(shaft) for shaft in plant.shafts),
+        transmissions=tuple(
+            Transmission(
+                t.from_shaft, t.to_shaft, t.ratio, t.stiffness if np.isfinite(t.stiffness) else None, t.damping, t.backlash
+            )
+            for t in plant.transmissions
+        ),
+        motors=tuple(_motor(motor) for motor in plant.motors),
+        controller=_controller(plant.controllers[0], plant.motors[0].drive) if plant.controllers else None,
+        channels=(*driven, *sensors, *(Channel(name, name) for name in seen)),
+    )
+
+
+@dataclass(frozen=True)
+class Run:
+    """Outputs and states of a free run by name, at the nodes."""
+
+    time: np.ndarray
+    values: Mapping[str, np.ndarray]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.values[name]
+
+
+def _signal(trajectory: Trajectory | float) -> InputSignal:
+    if isinstance(trajectory, Trajectory):
+        return InputSignal(trajectory.time, trajectory.value, trajectory.hold == "zero")
+    return InputSignal(np.zeros(1), np.array([float(trajectory)]), True)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A stepped drive and its compiled sweep, to be run under any inputs."""
+
+    drive: Drive
+    stepped: SteppedDrive = field(init=False)
+    sweep: Sweep = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stepped", stepped(self.drive))
+        object.__setattr__(self, "sweep", Sweep(self.stepped, ()))
+
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """Values of the parameters in the order of the stepped drive."""
+        values = {leaf.path: leaf.value for leaf in drive_leaves(self.drive)}
+        return np.array([float(values[name]) for name in self.stepped.parameter_names])
+
+    @property
+    def exact(self) -> np.ndarray:
+        """Smoothing widths of the exact laws: all zero."""
+        return np.zeros(len(self.stepped.mechanism.topology.roots) + 1)
+
+    def run(
+        self,
+        duration: float,
+        inputs: Mapping[str, Trajectory | float],
+        initial: Mapping[str, float] | None = None,
+        step: float = 1e-3,
+        every: float = 1e-3,
+        width: float = 0.0,
+    ) -> Run:
+        """Run freely from `initial` (by state name, else zero) with samples `every` s and steps of at most `step` s."""
+        samples = every * np.arange(round(duration / every) + 1)
+        signals = [_signal(inputs[name]) for name in self.stepped.input_names]
+        grid = build_grid(samples, signals, self.drive.controller, step)
+        start = np.array([[dict(initial or {}).get(name, 0.0) for name in self.stepped.state_names]])
+        last = np.array([0, grid.time.size - 1])
+        done = self.sweep.run(grid, last, start, self.numbers, self.exact + width, with_states=True)
+        at = np.searchsorted(grid.time, samples - 1e-9)
+        columns = dict(zip(self.stepped.state_names, done.states.T, strict=True))
+        columns |= dict(zip(self.stepped.output_names, done.y.T, strict=True))
+        return Run(samples, {name: column[at] for name, column in columns.items()})
+
+
+@dataclass(frozen=True)
+class Twin:
+    """The plant and the drive under test, driven alike."""
+
+    plant: Plant
+    inputs: Mapping[str, Trajectory | float]
+    bench: Bench = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bench", Bench(drive_of(self.plant, self.inputs)))
+
+    def run(
+        self, duration: float, initial: Mapping[str, float] | None = None, supply: float = 1.0, step: float = 1e-3
+    ) -> tuple[Run, Run]:
+        """Return the plant's truth and the free run of the drive, both every 1 ms from the same start."""
+        first = {name: value for name, value in (initial or {}).items() if not name.startswith("controller.")}
+        done = self.plant.simulate(duration, self.inputs, initial=first, truth_rate=1000, step=PLANT_STEP)
+        recorded = {name: np.interp(done.truth["time"], *channel) for name, channel in done.channels.items()}
+        truth = Run(done.truth["time"], done.truth | recorded)
+        return truth, self.bench.run(duration, {**self.inputs, "supply": supply}, self._states(initial or {}), step)
+
+    def _states(self, initial: Mapping[str, float]) -> dict[str, float]:
+        return {name.replace(".z", ".friction.z"): value for name, value in initial.items()}
+
+
+def worst(truth: Run, ours: Run, *names: str) -> float:
+    """Return the largest deviation over signals, each relative to the largest value of the truth."""
+    deviations = [np.max(np.abs(ours[name] - truth[name])) / np.max(np.abs(truth[name])) for name in names]
+    return float(np.max(deviations))
