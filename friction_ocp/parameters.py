@@ -54,7 +54,7 @@ def quantity(
     """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader.
 
     `nested` says what the number is in the simpler model that is fitted first: the name of the field that it
-    equals there, a value, or "guess". None: it takes part from the beginning.
+    equals there, a value, "guess", or, in a list, "first". None: it takes part from the beginning.
     """
     return dataclasses.field(default=default, metadata={"kind": kind, "meaning": meaning, "nested": nested})
 
@@ -111,6 +111,8 @@ def leaves(part: Any, prefix: str, motion: str = "rotary") -> Iterator[Leaf]:
 
 def _nested_path(item: dataclasses.Field[Any], path: str, leaf_path: str) -> str | float | None:
     nested = item.metadata["nested"]
+    if nested == "first":
+        return None if leaf_path == f"{path}.0" else f"{path}.0"
     if not isinstance(nested, str) or nested == "guess":
         return nested
     return f"{path.removesuffix(item.name)}{nested}{leaf_path.removeprefix(path)}"

@@ -2,8 +2,9 @@
 
 Each group obeys J (v1 - v0) / h = tau(v) - torque of friction, whose response over the step is
 offset + slope * mean speed + [-lower, upper] (friction/element.py). Solving for v1 is a soft threshold: no
-smoothing is needed, sticking is exact, and stiff friction does not limit the step. Order 2 while the shaft
-slides, 1 across an event. Related: Moreau 1988 (time stepping of dry friction).
+smoothing is needed, sticking is exact, and stiff friction does not limit the step. A shaft that comes to rest
+within the step does so at the share of the step where its speed is zero; over the rest of the step it sticks or
+starts anew, so that the order 2 holds across events too. Related: Moreau 1988 (time stepping of dry friction).
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ class Kick:
 
     v: ca.SX
     """(groups,) speeds after the step."""
+    mean: ca.SX
+    """(groups,) mean speeds over the step."""
     load: dict[str, Any]
     """Torque through each transmission that friction depends on, on its output side."""
     unknown: Unknown | None = None
@@ -74,7 +77,8 @@ def kick(mech: Mechanism, step: Step) -> Kick:
         return done
     symbols, solution = done.unknown.symbols, done.unknown.solution
     load = {name: ca.substitute(ca.SX(torque), symbols, solution) for name, torque in done.load.items()}
-    return Kick(ca.substitute(done.v, symbols, solution), load)
+    v, mean = (ca.substitute(vector, symbols, solution) for vector in (done.v, done.mean))
+    return Kick(v, mean, load)
 
 
 def implicit_kick(mech: Mechanism, step: Step) -> Kick:
@@ -85,11 +89,12 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     corner = step.width[len(mech.topology.roots)]
     load = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
     load |= {joint.name: symbols[k] for k, joint in enumerate(joints)}
-    v, friction = _solve(mech, step, torques, stiffening, load)
+    v, mean, friction = _solve(mech, step, torques, stiffening, load)
     if not joints:
-        return Kick(v, load)
-    found = column([_through(mech, step, joint, torques, v, friction) for joint in joints])
-    return Kick(v, load, Unknown(symbols, found))
+        return Kick(v, mean, load)
+    acceleration = (v - step.v) / step.h
+    found = column([through_joint(mech, joint, acceleration, torques, friction) for joint in joints])
+    return Kick(v, mean, load, Unknown(symbols, found))
 
 
 def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
@@ -120,32 +125,57 @@ def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> A
 
 def _solve(
     mech: Mechanism, step: Step, torques: dict[str, Any], own: list[Any], load: dict[str, Any]
-) -> tuple[ca.SX, dict[str, Any]]:
-    """Return the new group speeds and the friction torque on each shaft."""
+) -> tuple[ca.SX, ca.SX, dict[str, Any]]:
+    """Return new and mean speeds of the groups and the friction torque on each shaft."""
     speeds = [step.v[g] for g in range(len(mech.topology.roots))]
+    means = list(speeds)
     friction: dict[str, Any] = {}
     for group in mech.free_groups:
-        responses = {
-            name: _response(mech, step, mech.drive.shaft(name), load) for name in mech.topology.members(group)
-        }
-        whole = _combined(mech, responses)
-        inertia, linear_at = mech.inertia(group), step.at.v[group]
+        members = mech.topology.members(group)
+        responses = {name: _response(mech, step, mech.drive.shaft(name), load) for name in members}
+        whole, before = _combined(mech, responses), step.v[group]
         damping = whole.slope - own[group]
-        drive = _group_sum(mech, group, torques) - own[group] * linear_at - 0.5 * damping * step.v[group]
-        free = step.v[group] + step.h / inertia * (drive - whole.offset)
-        gain = step.h / inertia
-        moved = soft_threshold(free, gain * whole.upper, gain * whole.lower, step.width[group])
-        speeds[group] = moved / ca.fmax(1.0 + 0.5 * gain * damping, 0.5)
-        friction |= _shared(mech, step, group, responses, whole, (free - moved) / gain, speeds[group])
-    return column(speeds), friction
+        pushed = _group_sum(mech, group, torques) - own[group] * step.at.v[group] - whole.offset
+        gain = step.h / mech.inertia(group)
+        free = before + gain * (pushed - 0.5 * damping * before)
+        divisor = ca.fmax(1.0 + 0.5 * gain * damping, 0.5)
+        moved = soft_threshold(free, gain * whole.upper, gain * whole.lower, step.width[group]) / divisor
+        speeds[group], means[group] = moved, 0.5 * (before + moved)
+        if not ca.SX(whole.upper + whole.lower).is_zero():
+            resting = _combined(mech, {name: _response(mech, step, mech.drive.shaft(name), load, 0.0) for name in members})
+            slid = (free - gain * where(before >= 0, whole.upper, -whole.lower)) / divisor
+            speeds[group], means[group] = _through_rest(step, group, gain * pushed, gain, resting, slid, moved)
+        set_valued = (free - speeds[group] * divisor) / gain
+        friction |= _shared(mech, step, group, responses, whole, set_valued, speeds[group])
+    return column(speeds), column(means), friction
 
 
-def _response(mech: Mechanism, step: Step, shaft: Shaft, load: dict[str, Any]) -> StepResponse:
+def _through_rest(
+    step: Step, group: int, pushed: Any, gain: Any, resting: StepResponse, slid: Any, moved: Any
+) -> tuple[Any, Any]:
+    """Return new and mean speed of a group that may come to rest within the step.
+
+    `slid` is the speed that unchanged sliding would lead to, `moved` the soft threshold over the whole step, which
+    holds where the speed keeps its sign, the group starts from rest, or the sign is smoothed.
+    """
+    before = step.v[group]
+    stops = ca.logic_and(before * slid < 0, step.width[group] <= 0)
+    stopping = where(stops, before / where(stops, before - slid, 1.0), 0.0)
+    rest = 1.0 - stopping
+    after = soft_threshold(rest * pushed, rest * gain * resting.upper, rest * gain * resting.lower)
+    mean = 0.5 * (stopping * before + rest * after)
+    return where(stops, after, moved), where(stops, mean, 0.5 * (before + moved))
+
+
+def _response(
+    mech: Mechanism, step: Step, shaft: Shaft, load: dict[str, Any], speed: float | None = None
+) -> StepResponse:
+    """Return the response of a shaft's friction about the step's own speed, or about the group speed given."""
     omega = symbol("omega")
     element: FrictionElement = shaft.friction
     transmitted = transmitted_torque(mech, shaft, load)
     response = element.step_response(step.h, omega, step.bristle.get(shaft.name, 0.0), transmitted)
-    now = mech.shaft_speed(shaft.name, step.at.v)
+    now = mech.shaft_speed(shaft.name, step.at.v) if speed is None else ca.SX(speed)
     terms = (response.offset, response.slope, response.upper, response.lower)
     return StepResponse(*(ca.substitute(ca.SX(term), omega, now) for term in terms))
 
@@ -195,15 +225,16 @@ def _shared(
     return friction
 
 
-def _through(
-    mech: Mechanism, step: Step, joint: Transmission, torques: dict[str, Any], v: ca.SX, friction: dict[str, Any]
+def through_joint(
+    mech: Mechanism, joint: Transmission, acceleration: ca.SX, torques: dict[str, Any], friction: dict[str, Any]
 ) -> Any:
-    """Return the torque through a rigid joint on its output side, from the balance of what lies beyond it."""
-    group = mech.topology.group_of[joint.to_shaft]
-    acceleration = (v[group] - step.v[group]) / step.h
+    """Return the torque through a rigid joint on its output side, from the balance of what lies beyond it.
+
+    `acceleration` (groups,); `torques` and `friction` by shaft.
+    """
     ratio = mech.topology.speed_ratio
     total: Any = 0.0
     for name in mech.topology.beyond(joint):
-        resisting = mech.drive.shaft(name).inertia * ratio[name] * acceleration + friction.get(name, 0.0)
+        resisting = mech.drive.shaft(name).inertia * mech.shaft_speed(name, acceleration) + friction.get(name, 0.0)
         total = total + ratio[name] / ratio[joint.to_shaft] * (resisting - torques[name])
     return total

@@ -6,7 +6,6 @@ time-stepping form with exact sticking are both made from the same expressions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -261,6 +260,15 @@ class Mechanism:
             rates.append(integral_rate(controller, self.seen(motion), integral))
         return column(rates)
 
+    def cut(self, extra: ca.SX) -> ca.SX:
+        """Return the continuous states without the winding currents of motors that are not enabled."""
+        kept = list(ca.vertsplit(extra))
+        for motor in self.drive.motors:
+            if self._has_winding_state(motor):
+                k = self.extra_names.index(f"{motor.name}.current")
+                kept[k] = self._enabled(motor, kept[k])
+        return column(kept)
+
 
 def mechanism(drive: Drive) -> Mechanism:
     """Turn a drive into symbols; every number of the drive becomes a parameter named by its path."""
@@ -290,8 +298,3 @@ def _is_live(drive: Drive, path: str) -> bool:
         if path == f"{item.name}.backlash" and item.backlash == 0.0:
             return False
     return True
-
-
-def named_values(names: Mapping[str, Any], values: Mapping[str, float]) -> list[float]:
-    """Return `values` in the order of `names`."""
-    return [values[name] for name in names]

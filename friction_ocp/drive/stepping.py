@@ -17,6 +17,9 @@ from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_to
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Channel, Drive
 
+INSTANT = 1e-2
+"""Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt where the speed is nearly 0."""
+
 
 @dataclass(frozen=True)
 class Implicit:
@@ -78,13 +81,15 @@ def _state(mech: Mechanism) -> _State:
     return _State(ca.vertcat(*parts), *parts)
 
 
-def _angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
+def group_angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
+    """Return the angles of all groups from those that are states; the others are inputs."""
     where_is = {g: k for k, g in enumerate(mech.angle_groups)}
     groups = range(len(mech.topology.roots))
     return column([angles[where_is[g]] if g in where_is else _prescribed(mech, g, "theta") for g in groups])
 
 
-def _speeds(mech: Mechanism, speeds: ca.SX) -> ca.SX:
+def group_speeds(mech: Mechanism, speeds: ca.SX) -> ca.SX:
+    """Return the speeds of all groups from those that are states; the others are inputs."""
     where_is = {g: k for k, g in enumerate(mech.free_groups)}
     groups = range(len(mech.topology.roots))
     return column([speeds[where_is[g]] if g in where_is else _prescribed(mech, g, "omega") for g in groups])
@@ -135,21 +140,24 @@ class _Expression:
 
 
 def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
-    q0, v0 = _angles(mech, state.angles), _speeds(mech, state.speeds)
+    q0, v0 = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * _pick(v0, mech.angle_groups)
-    middle, mean = _angles(mech, free_angles), v0
+    mean = v0
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
     extra, v1, load = state.extra, v0, dict[str, Any]()
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
+        # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
+        # to fourth order in its frequencies (Takahashi & Imada 1984)
+        middle = group_angles(mech, free_angles + h / 12.0 * _pick(v1 - v0, mech.angle_groups))
         at = Motion(middle, mean, extra, state.memory)
         done = implicit_kick(mech, Step(h, v0, at, bristle, width))
         v1, load = done.v, done.load
         unknowns += [] if done.unknown is None else [done.unknown]
-        mean = 0.5 * (v0 + v1)
+        mean = done.mean
         extra = 0.5 * (state.extra + _advance_extra(mech, state, Motion(middle, mean, state.extra, state.memory), h))
     after = 2.0 * extra - state.extra
-    angles = free_angles + 0.5 * h * _pick(v1, mech.angle_groups)
+    angles = state.angles + h * _pick(mean, mech.angle_groups)
     deflections = _advance_bristles(mech, state, mean, h, load)
     value = ca.vertcat(angles, _pick(v1, mech.free_groups), deflections, after, state.memory)
     return _Expression(value, tuple(unknowns))
@@ -160,12 +168,12 @@ def _pick(vector: ca.SX, groups: tuple[int, ...]) -> ca.SX:
 
 
 def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.SX:
-    """Linearly implicit midpoint step of the currents and integrals, each by its own time constant."""
+    """Linearly implicit midpoint step of the currents and integrals."""
     if not mech.extra_names:
         return state.extra
     rates = mech.extra_rates(at)
-    own = column([ca.jacobian(rates[k], state.extra[k]) for k in range(rates.numel())])
-    return state.extra + h * rates / (1.0 - 0.5 * h * own)
+    implicit = ca.SX.eye(rates.numel()) - 0.5 * h * ca.jacobian(rates, state.extra)
+    return mech.cut(state.extra + h * ca.solve(implicit, rates))
 
 
 def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, load: dict[str, Any]) -> ca.SX:
@@ -178,15 +186,16 @@ def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, loa
 
 
 def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
-    q, v = _angles(mech, state.angles), _speeds(mech, state.speeds)
+    q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
     at = Motion(q, v, state.extra, state.memory)
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
-    done = implicit_kick(mech, Step(h, v, at, bristle, width))
-    value = column([_recorded(mech, channel, at, (done.v - v) / h) for channel in mech.drive.outputs])
+    instant = INSTANT * h
+    done = implicit_kick(mech, Step(instant, v, at, bristle, width))
+    value = column([recorded(mech, channel, at, (done.v - v) / instant) for channel in mech.drive.outputs])
     return _Expression(value, () if done.unknown is None else (done.unknown,))
 
 
-def _recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
+def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
     """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives."""
     value, rate, curvature = _signal(mech, channel, at, acceleration)
     delayed = value - channel.delay * rate + 0.5 * channel.delay**2 * curvature
@@ -211,7 +220,7 @@ def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) 
 def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
     controller = mech.drive.controller
     assert controller is not None
-    at = Motion(_angles(mech, state.angles), _speeds(mech, state.speeds), state.extra, state.memory)
+    at = Motion(group_angles(mech, state.angles), group_speeds(mech, state.speeds), state.extra, state.memory)
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
     computed, applied = compute_tick(controller, mech.seen(at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]

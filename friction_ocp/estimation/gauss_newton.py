@@ -37,6 +37,9 @@ class Tolerances:
 
     decrease: float = 1e-8
     """Predicted decrease of the objective, relative to the objective."""
+    negligible: float = 1e-4
+    """Predicted decrease that is too small to matter whatever the objective: residuals are in noise floors, so that
+    it moves no combination of parameters by more than sqrt(2e-4) of its standard error."""
     progress: float = 1e-7
     """Actual decrease of three steps in a row, relative to the objective."""
     stalled: float = 1e-4
@@ -84,7 +87,7 @@ def _descend(
     grow = 4.0
     while damping <= LARGEST_DAMPING:
         trial, predicted = trial_step(program.space, point, system, damping)
-        if predicted <= tolerances.decrease * system.objective and damping <= 1e-2:
+        if predicted <= max(tolerances.decrease * system.objective, tolerances.negligible) and damping <= 1e-2:
             return _Accepted(point, None, damping)
         after = program.linearise(trial)
         gained = system.objective - after.objective
@@ -101,7 +104,7 @@ def _stuck(
 ) -> Solution:
     _, predicted = trial_step(program.space, point, system, 1e-6)
     relative = predicted / max(system.objective, 1e-300)
-    if relative <= tolerances.stalled:
+    if relative <= tolerances.stalled or predicted <= tolerances.negligible:
         return Solution(point, system.objective, iteration, True, "no step decreases the objective further")
     text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
     return Solution(point, system.objective, iteration, False, text)

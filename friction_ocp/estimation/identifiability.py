@@ -13,6 +13,8 @@ from friction_ocp.simulation.grid import FloatArray
 CONDITION_INDEX = 30.0
 VARIANCE_SHARE = 0.5
 """Thresholds of Belsley, Kuh & Welsch 1980 for a harmful near-dependency."""
+MATERIAL = 0.01
+"""Relative standard error from which a near-dependency is worth a word: below it the parameter is known anyway."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +30,14 @@ def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tu
     """Judge every parameter."""
     unseen = _unseen(space, theta, found)
     partners = _partners(found, ~(found.at_bound | unseen))
+    vague = found.std_error > MATERIAL * np.abs(theta)
     result: list[Verdict] = []
     for k in range(theta.size):
         if found.at_bound[k]:
             result.append(Verdict("at_bound"))
         elif unseen[k]:
             result.append(Verdict("not_identifiable"))
-        elif partners[k]:
+        elif partners[k] and vague[k]:
             result.append(Verdict("traded", tuple(space.names[j] for j in partners[k])))
         else:
             result.append(Verdict("ok"))

@@ -20,9 +20,9 @@ from friction_ocp.simulation.sweep import Sweep
 
 ComplexArray = npt.NDArray[np.complex128]
 
-STEP_PER_RADIAN = 0.1
-"""Integrator step over the inverse of the fastest oscillation: frequencies are then right to 0.04 %."""
-STEP_PER_DECAY = 0.5
+STEP_PER_RADIAN = 0.05
+"""Integrator step over the inverse of the fastest oscillation."""
+STEP_PER_DECAY = 0.1
 """Integrator step over the shortest decay time."""
 
 

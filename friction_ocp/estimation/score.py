@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
@@ -54,7 +54,7 @@ def simulate_recordings(
     span = horizon(model)
     program = free_run(model, experiments, width, Squares(), span)
     point = Point(theta, program.suggested_nodes(theta))
-    point = solve_nodes(program, point) if span is None else _smoothed(model, experiments, program, point)
+    point = solve_nodes(program, point) if fits_free_run(model) else _smoothed(model, experiments, program, point)
     runs: list[FreeRun] = []
     for index, item in enumerate(experiments):
         result = program.simulate(index, point, with_states=True)
@@ -68,11 +68,10 @@ def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Progra
     smoother = relaxed(model, experiments, 0.0, Squares())
     solved = solve_nodes(smoother, Point(point.theta, smoother.suggested_nodes(point.theta)))
     nodes: list[FloatArray] = []
-    for index, cut in enumerate(smoother.segments):
+    for index in range(len(smoother.segments)):
         track = smoother.simulate(index, solved, with_states=True).states
         assert track is not None
         nodes.append(track[program.segments[index].first[:-1]])
-        del cut
     return replace(point, nodes=tuple(nodes))
 
 

@@ -103,15 +103,15 @@ def mean_error(program: Program, point: Point) -> float:
     return float(np.mean(np.concatenate(sizes)))
 
 
-def losses(model: Model, program: Program, point: Point) -> Iterator[AbstractLoss]:
-    """Yield the losses of the successive stages of a fit."""
+def losses(model: Model, program: Program, point: Point, stages: int) -> Iterator[AbstractLoss]:
+    """Yield the losses of the successive stages of a fit; the absolute loss takes its own number of stages."""
     match model.problem.estimation.loss:
         case "squares":
-            yield from (Squares(),) * len(WIDTHS)
+            yield from (Squares(),) * stages
         case "huber":
-            yield from (Huber(),) * len(WIDTHS)
+            yield from (Huber(),) * stages
         case "student_t":
-            yield from (StudentT(),) * len(WIDTHS)
+            yield from (StudentT(),) * stages
         case "absolute":
             size = mean_error(program, point)
             yield from (Absolute(rounding * size) for rounding in ROUNDINGS)

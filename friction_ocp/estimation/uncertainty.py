@@ -12,6 +12,8 @@ from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.simulation.grid import FloatArray
 
 CONFIDENCE = 0.95
+NO_INFORMATION = 1e-30
+"""Stands for the information on a parameter that no residual depends on."""
 MIN_BLOCKS, MAX_BLOCKS = 24, 200
 """Blocks of residuals that the robust covariance is summed over: enough to average, long enough to be independent."""
 
@@ -86,7 +88,8 @@ def _density_weight(found: Influence) -> FloatArray:
 
 def _inverse(matrix: FloatArray) -> FloatArray:
     """Invert a scaled information matrix; directions without information get a huge variance."""
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    own = np.diag(matrix)
+    size = np.sqrt(np.where(own > 0, own, NO_INFORMATION))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
     values = np.maximum(values, 1e-14)
     return (vectors / values) @ vectors.T / np.outer(size, size)

@@ -14,7 +14,7 @@ import casadi as ca
 
 from friction_ocp.friction.bristle import Dahl, LuGre
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction
-from friction_ocp.friction.smoothing import positive_part, smooth_abs, smooth_sign, where
+from friction_ocp.friction.smoothing import decay_means, positive_part, smooth_abs, smooth_sign, where
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Directional, Value, inline, quantity
 
@@ -138,13 +138,14 @@ class FrictionElement:
         return StepResponse(0.0, slope, levels[0], levels[1])
 
     def _bristle_response(self, h: Any, omega: Any, deflection: Any, transmitted: Any) -> StepResponse:
-        sigma1 = self._sigma(1, deflection)
+        sigma0, sigma1 = self._sigma(0, deflection), self._sigma(1, deflection)
         rate = self.forgetting_rate(omega, deflection, transmitted)
-        stiffness = (self._sigma(0, deflection) - sigma1 * rate) / (1.0 + 0.5 * h * rate)
-        slope = 0.5 * h * stiffness + sigma1 + self._viscous(omega, transmitted)
-        return StepResponse(stiffness * deflection, slope, 0.0, 0.0)
+        kept, added = decay_means(h * rate)
+        slope = sigma0 * h * added + sigma1 * kept + self._viscous(omega, transmitted)
+        return StepResponse((sigma0 - sigma1 * rate) * kept * deflection, slope, 0.0, 0.0)
 
     def advance(self, h: Any, omega: Any, mean_omega: Any, deflection: Any, transmitted: Any) -> Any:
-        """Return the deflection after a step: implicit midpoint, the forgetting rate frozen at `omega`."""
-        half = 0.5 * h * self.forgetting_rate(omega, deflection, transmitted)
-        return (deflection * (1.0 - half) + h * mean_omega) / (1.0 + half)
+        """Return the deflection after a step at constant speed, exact but for the rate frozen at `omega`."""
+        rate = self.forgetting_rate(omega, deflection, transmitted)
+        kept, _ = decay_means(h * rate)
+        return deflection + h * kept * (mean_omega - rate * deflection)

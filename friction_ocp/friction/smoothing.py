@@ -65,3 +65,16 @@ def power(base: Any, exponent: Any) -> Any:
     """base**exponent for base >= 0 with finite derivatives at base = 0."""
     logarithm = 0.5 * (ca.log if isinstance(base, ca.SX) else np.log)(base * base + 1e-16)
     return exp(exponent * logarithm)
+
+
+def decay_means(decay: Any) -> tuple[Any, Any]:
+    """Return (1 - e^-decay) / decay and (1 - that) / decay, for decay >= 0.
+
+    Over a step with this decay they are the mean of what is forgotten and of what a constant source adds.
+    """
+    large = decay > 1e-2
+    safe = where(large, decay, 1.0)
+    exact = -(ca.expm1(-safe) if isinstance(safe, ca.SX) else np.expm1(-safe)) / safe
+    first = where(large, exact, 1.0 - decay / 2.0 * (1.0 - decay / 3.0 * (1.0 - decay / 4.0)))
+    second = where(large, (1.0 - exact) / safe, 0.5 - decay / 6.0 * (1.0 - decay / 4.0 * (1.0 - decay / 5.0)))
+    return first, second

@@ -108,8 +108,8 @@ class Polyline(AbstractFrictionLaw):
     """
 
     tau_c: Value = quantity("torque", "Coulomb friction")
-    slopes: tuple[Value, ...] = quantity("viscous", "slope of a segment")
-    breaks: tuple[Value, ...] = quantity("speed", "speed at which the slope changes", ())
+    slopes: tuple[Value, ...] = quantity("viscous", "slope of a segment", nested="first")
+    breaks: tuple[Value, ...] = quantity("speed", "speed at which the slope changes", (), nested="guess")
     omega_zero: Value = quantity("speed", "speed below which the friction is a line through zero", None)
     name: ClassVar[str] = "polyline"
 

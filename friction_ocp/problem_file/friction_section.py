@@ -46,7 +46,7 @@ def read_friction(value: Any) -> FrictionElement:
         raise refuse("friction", [Fault((), what, "a mapping such as {law: coulomb, tau_c: 0.1}")])
     laws = friction_laws()
     name = cast(Mapping[str, Any], value).get("law")
-    if name not in laws:
+    if not isinstance(name, str) or name not in laws:
         what = f"unknown friction law {name!r}" if "law" in value else "this key is missing"
         fault = Fault(("law",), what, f"available: {', '.join(laws)}", closest(str(name), list(laws)))
         raise refuse("friction", [fault])

@@ -29,14 +29,24 @@ class SweepMap:
         """How many torques are unknown."""
         return self.torques.numel()
 
-    def function(self) -> ca.Function:
-        """Return (arguments, torques) -> value."""
-        return self._function(self.name, [self.value])
+    def value_functions(self) -> tuple[ca.Function, ...]:
+        """Return (arguments) -> value or, for an implicit map, its three stages.
 
-    def newton(self) -> ca.Function:
-        """Return (arguments, torques) -> better torques, one step of Newton's method."""
+        (arguments) -> constants that do not depend on the torques; (arguments, torques, constants) -> better
+        torques, one step of Newton's method; (arguments, torques, constants) -> value.
+        """
+        if not self.unknowns:
+            return (self._function(self.name, [], [self.value]),)
         slope = ca.SX.eye(self.unknowns) - ca.jacobian(self.found, self.torques)
-        return self._function(f"{self.name}_n", [self.torques - ca.solve(slope, self.torques - self.found)])
+        better = self.torques - ca.solve(slope, self.torques - self.found)
+        stacked = ca.cse(ca.vertcat(better, self.value))
+        rest, symbols, constants = ca.extract_parametric(stacked, ca.vertcat(*self.arguments), {})
+        after = [self.torques, ca.vertcat(*symbols)]
+        return (
+            self._function(f"{self.name}_c", [], [ca.vertcat(*constants)]),
+            self._function(f"{self.name}_n", after, [rest[: self.unknowns]]),
+            self._function(self.name, after, [rest[self.unknowns :]]),
+        )
 
     def derivative(self, active: Sequence[int]) -> ca.Function:
         """Return (arguments, torques) -> value, Jacobian by state, Jacobian by active parameters, all dense.
@@ -45,12 +55,9 @@ class SweepMap:
         """
         by_state = self._total(self.arguments[0])
         by_active = self._total(ca.vertcat(*[self.arguments[2][k] for k in active]))
-        return self._function(f"{self.name}_d", [self.value, by_state, by_active])
-
-    def explicit(self, function: ca.Function) -> ca.Function:
-        """Return a function of (arguments, torques) as one of the arguments alone."""
-        values = function.call([*self.arguments, *([self.start] if self.unknowns else [])], True, False)
-        return ca.Function(function.name(), list(self.arguments), values, {"cse": True})
+        return self._function(
+            f"{self.name}_d", [self.torques] if self.unknowns else [], [self.value, by_state, by_active]
+        )
 
     def _total(self, by: ca.SX) -> ca.SX:
         if by.numel() == 0:
@@ -62,9 +69,8 @@ class SweepMap:
         moved = ca.solve(slope, ca.jacobian(self.found, by))
         return partial + ca.mtimes(ca.jacobian(self.value, self.torques), moved)
 
-    def _function(self, name: str, values: list[ca.SX]) -> ca.Function:
-        arguments = [*self.arguments, *([self.torques] if self.unknowns else [])]
-        return ca.Function(name, arguments, [ca.densify(value) for value in values], {"cse": True})
+    def _function(self, name: str, more: list[ca.SX], values: list[ca.SX]) -> ca.Function:
+        return ca.Function(name, [*self.arguments, *more], [ca.densify(value) for value in values], {"cse": True})
 
 
 def sweep_maps(drive: SteppedDrive, active: Sequence[int]) -> dict[str, SweepMap]:

@@ -1,21 +1,27 @@
-/* Loop of the generated one-step functions over the samples of a segment, with forward sensitivities.
+/* Loop of the generated maps of a drive over the samples of segments, with forward sensitivities.
 
-   Above this text stand the code that CasADi generated and the sizes
+   Above this text stand the code that CasADi generated from maps.py and the sizes
      NX NU NP NA NY            states, inputs, parameters, active parameters, outputs;
+     NL NK                     most unknown torques, and constants of their equations, of any map;
      SZ_ARG SZ_RES SZ_IW SZ_W  work space that suffices for every generated function;
-     HAS_TICK                  where the drive has a sampled controller.
-   fo_step, fo_output and fo_tick give values; fo_step_d, fo_output_d and fo_tick_d give the value and its
-   Jacobians by state and by active parameters, column major.
+   then a table of the maps (STEP, OUTPUT and, where there are any, TICK and NOW) and the list DELAYS of the
+   parameters that must be 0 for NOW to replace OUTPUT.
+   Each map has the functions of maps.py: for unknown torques, if any, the constants of their equations and one step
+   of Newton's method; the value; the value with its Jacobians by state and by active parameters, column major.
    Sensitivities have NC = NX + NA columns: the state at the segment's start, then the active parameters.
-   Nothing is static: calls from several threads at once are safe. */
+   Nothing here is static: calls from several threads at once are safe. */
 
 #define NC (NX + NA)
+#define NEWTON_LIMIT 15
+#define NEWTON_TOLERANCE 1e-8 /* of the last correction; Newton's method squares it */
 
 typedef struct {
   double w[SZ_W];
   casadi_int iw[SZ_IW];
   const double *arg[SZ_ARG];
   double *res[SZ_RES];
+  double value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], moved[(NX + NY) * NC + 1];
+  double step_torques[NL + 1], output_torques[NL + 1], constants[NK + 1];
 } work_space;
 
 /* Grid, inputs and parameters of a segment; all pointers at its first node. */
@@ -25,6 +31,7 @@ typedef struct {
   const long *substeps, *ticks;
   const double *u0, *u1, *un;
   const double *p, *width;
+  const map *output;
 } course;
 
 /* out = a s + [0, b]: the chain rule of one map; a (rows x NX), b (rows x NA), s (NX x NC), column major. */
@@ -38,70 +45,84 @@ static inline void chain(int rows, const double *restrict a, const double *restr
     }
 }
 
-static inline void pass_on(const double *a, const double *b, double *s) {
-  double moved[NX * NC + 1];
-  chain(NX, a, b, s, moved);
-  memcpy(s, moved, sizeof(double) * NX * NC);
+/* Solve for the unknown torques of a map from where they were last; work->arg holds the arguments. */
+static void solve(const map *m, double *torques, work_space *work) {
+  work->arg[5] = torques;
+  work->arg[6] = work->res[0] = work->constants;
+  m->constants(work->arg, work->res, work->iw, work->w, 0);
+  work->res[0] = work->value;
+  for (int k = 0; k < NEWTON_LIMIT; ++k) {
+    double change = 0.0, size = 0.0;
+    m->newton(work->arg, work->res, work->iw, work->w, 0);
+    for (int i = 0; i < m->unknowns; ++i) {
+      change = fmax(change, fabs(work->value[i] - torques[i]));
+      size = fmax(size, fabs(work->value[i]));
+      torques[i] = work->value[i];
+    }
+    if (!(change > NEWTON_TOLERANCE * size)) break;
+  }
 }
 
-static void step_once(const course *at, const double *u, double h, double *x, double *s, work_space *work) {
-  double next[NX + 1], a[NX * NX + 1], b[NX * NA + 1];
+/* Put the value of a map into work->value and, with `derivatives`, its Jacobians into work->a and work->b. */
+static void evaluate(const map *m, double *torques, int derivatives, work_space *work) {
+  if (m->unknowns) solve(m, torques, work);
+  work->res[0] = work->value;
+  work->res[1] = work->a;
+  work->res[2] = work->b;
+  (derivatives ? m->derivative : m->value)(work->arg, work->res, work->iw, work->w, 0);
+}
+
+/* Advance state x (NX) and sensitivities s (NX x NC, or NULL) by a map; work->arg holds the arguments. */
+static void advance(const map *m, double *x, double *s, work_space *work) {
+  evaluate(m, work->step_torques, s != 0, work);
+  memcpy(x, work->value, sizeof(double) * NX);
+  if (s) {
+    chain(NX, work->a, work->b, s, work->moved);
+    memcpy(s, work->moved, sizeof(double) * NX * NC);
+  }
+}
+
+static void step(const course *at, const double *u, double h, double *x, double *s, work_space *work) {
   const double **arg = work->arg;
   arg[0] = x, arg[1] = u, arg[2] = at->p, arg[3] = &h, arg[4] = at->width;
-  work->res[0] = next, work->res[1] = a, work->res[2] = b;
-  if (s) {
-    fo_step_d(arg, work->res, work->iw, work->w, 0);
-    pass_on(a, b, s);
-  } else {
-    fo_step(arg, work->res, work->iw, work->w, 0);
-  }
-  memcpy(x, next, sizeof(double) * NX);
+  advance(&STEP, x, s, work);
 }
 
-static void tick_once(const course *at, long k, double kind, double *x, double *s, work_space *work) {
-#ifdef HAS_TICK
-  double next[NX + 1], a[NX * NX + 1], b[NX * NA + 1];
+static void tick(const course *at, long k, double kind, double *x, double *s, work_space *work) {
+#ifdef TICK
   const double **arg = work->arg;
   arg[0] = x, arg[1] = at->un + k * NU, arg[2] = at->p, arg[3] = &kind;
-  work->res[0] = next, work->res[1] = a, work->res[2] = b;
-  if (s) {
-    fo_tick_d(arg, work->res, work->iw, work->w, 0);
-    pass_on(a, b, s);
-  } else {
-    fo_tick(arg, work->res, work->iw, work->w, 0);
-  }
-  memcpy(x, next, sizeof(double) * NX);
+  advance(&TICK, x, s, work);
 #endif
 }
 
-/* Outputs y (NY) and, where s and dy are given, dy (NY x NC, row major) at node k. */
+/* Write outputs y (NY) and, where s and dy are given, dy (NY x NC, row major) at node k. */
 static void observe(const course *at, long k, double h, const double *x, const double *s, double *y, double *dy,
                     work_space *work) {
-  double c[NY * NX + 1], d[NY * NA + 1], columns[NY * NC + 1];
   const double **arg = work->arg;
+  int derivatives = s && dy;
   arg[0] = x, arg[1] = at->un + k * NU, arg[2] = at->p, arg[3] = &h, arg[4] = at->width;
-  work->res[0] = y, work->res[1] = c, work->res[2] = d;
-  if (!(s && dy)) {
-    fo_output(arg, work->res, work->iw, work->w, 0);
-    return;
-  }
-  fo_output_d(arg, work->res, work->iw, work->w, 0);
-  chain(NY, c, d, s, columns);
+  evaluate(at->output, work->output_torques, derivatives, work);
+  memcpy(y, work->value, sizeof(double) * NY);
+  if (!derivatives) return;
+  chain(NY, work->a, work->b, s, work->moved);
   for (int i = 0; i < NY; ++i)
-    for (int col = 0; col < NC; ++col) dy[i * NC + col] = columns[col * NY + i];
+    for (int c = 0; c < NC; ++c) dy[i * NC + c] = work->moved[c * NY + i];
 }
 
-/* One segment: state x (NX) and sensitivities s (NX x NC, or NULL) advance in place; states (n x NX), y (n x NY)
-   and dy (n x NY x NC), each of which may be NULL, are written at the nodes. The closing node is the next
-   segment's first: only the last segment, which `closes`, ticks and writes it. */
+/* One segment: state x and sensitivities s (or NULL) advance in place; states (n x NX), y (n x NY) and dy
+   (n x NY x NC), each of which may be NULL, are written at the nodes. The closing node is the next segment's first:
+   only the last segment, which `closes`, ticks and writes it. */
 static void segment(const course *at, double *x, double *s, double *states, double *y, double *dy, int closes) {
   work_space work;
   double u[NU + 1], h = at->dt[0] / (double)at->substeps[0];
+  memset(work.step_torques, 0, sizeof work.step_torques);
+  memset(work.output_torques, 0, sizeof work.output_torques);
   for (long k = 0; k < at->n; ++k) {
     int last = k == at->n - 1;
     if (last && !closes) return;
-    if (at->ticks[k] & 2) tick_once(at, k, 2.0, x, s, &work);
-    if (at->ticks[k] & 1) tick_once(at, k, 1.0, x, s, &work);
+    if (at->ticks[k] & 2) tick(at, k, 2.0, x, s, &work);
+    if (at->ticks[k] & 1) tick(at, k, 1.0, x, s, &work);
     if (at->dt[k] > 0.0) h = at->dt[k] / (double)at->substeps[k];
     if (states) memcpy(states + k * NX, x, sizeof(double) * NX);
     if (y && NY > 0) observe(at, k, h, x, s, y + k * NY, dy ? dy + k * NY * NC : 0, &work);
@@ -110,21 +131,33 @@ static void segment(const course *at, double *x, double *s, double *states, doub
       double share = (sub + 0.5) / (double)at->substeps[k];
       for (int i = 0; i < NU; ++i)
         u[i] = at->u0[k * NU + i] + share * (at->u1[k * NU + i] - at->u0[k * NU + i]);
-      step_once(at, u, h, x, s, &work);
+      step(at, u, h, x, s, &work);
     }
   }
 }
 
-/* All segments: segment j covers nodes first[j] .. first[j + 1] (the closing node included, for continuity).
+static const map *output_map(const double *p) {
+#ifdef NOW
+  int delayed = 0;
+  for (unsigned i = 0; i < sizeof DELAYS / sizeof *DELAYS; ++i) delayed |= p[DELAYS[i]] != 0.0;
+  if (!delayed) return &NOW;
+#endif
+  return &OUTPUT;
+}
+
+/* Segments one after the other: segment j covers nodes first[j] .. first[j + 1]; the last one `closes` the
+   recording or not. Grid arrays and y, dy, states begin at node 0 of the recording.
    x0 (segments x NX) -> end (segments x NX) and, with `derivatives`, dend (segments x NX x NC, column major). */
-SWEEP_EXPORT void friction_ocp_sweep(long segments, const long *first, const double *dt, const long *substeps,
-                                     const long *ticks, const double *u0, const double *u1, const double *un,
-                                     const double *p, const double *width, const double *x0, int derivatives,
-                                     double *states, double *y, double *dy, double *end, double *dend) {
+SWEEP_EXPORT void friction_ocp_sweep(long segments, int closes, const long *first, const double *dt,
+                                     const long *substeps, const long *ticks, const double *u0, const double *u1,
+                                     const double *un, const double *p, const double *width, const double *x0,
+                                     int derivatives, double *states, double *y, double *dy, double *end,
+                                     double *dend) {
+  const map *output = output_map(p);
   for (long j = 0; j < segments; ++j) {
     long begin = first[j], count = first[j + 1] - begin + 1;
     course at = {count,           dt + begin,      substeps + begin, ticks + begin, u0 + begin * NU,
-                 u1 + begin * NU, un + begin * NU, p,                width};
+                 u1 + begin * NU, un + begin * NU, p,                width,         output};
     double x[NX + 1], s[NX * NC + 1];
     memcpy(x, x0 + j * NX, sizeof(double) * NX);
     if (derivatives) {
@@ -132,7 +165,7 @@ SWEEP_EXPORT void friction_ocp_sweep(long segments, const long *first, const dou
       for (int i = 0; i < NX; ++i) s[i * NX + i] = 1.0;
     }
     segment(&at, x, derivatives ? s : 0, states ? states + begin * NX : 0, y ? y + begin * NY : 0,
-            (derivatives && dy) ? dy + begin * NY * NC : 0, j == segments - 1);
+            (derivatives && dy) ? dy + begin * NY * NC : 0, closes && j == segments - 1);
     memcpy(end + j * NX, x, sizeof(double) * NX);
     if (derivatives) memcpy(dend + j * NX * NC, s, sizeof(double) * NX * NC);
   }

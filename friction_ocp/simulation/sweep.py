@@ -1,10 +1,11 @@
-"""Simulation of many segments with sensitivities, in native code or in CasADi's virtual machine."""
+"""Simulation of many segments with sensitivities: the one front of native code and CasADi's virtual machine."""
 
 from __future__ import annotations
 
-import ctypes
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -12,22 +13,13 @@ import numpy as np
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.simulation.compiled import compile_sweep
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
+from friction_ocp.simulation.interpreted import InterpretedKernel
+from friction_ocp.simulation.kernel import AbstractKernel, SweepRequest, SweepResult, empty_result
 
+__all__ = ["Sweep", "SweepRequest", "SweepResult"]
 
-@dataclass(frozen=True)
-class SweepResult:
-    """Outputs at every node and states at every segment's end; derivatives by [initial state, active parameters]."""
-
-    y: FloatArray
-    """(n, outputs); at a node that closes a segment the value of the segment that begins there."""
-    end: FloatArray
-    """(segments, states)."""
-    dy: FloatArray | None = None
-    """(n, outputs, states + active)."""
-    dend: FloatArray | None = None
-    """(segments, states, states + active)."""
-    states: FloatArray | None = None
-    """(n, states), where asked for."""
+STEPS_WORTH_A_THREAD = 1500
+"""Integrator steps (about 0.3 ms) below which handing work to another thread costs more than it saves."""
 
 
 class Sweep:
@@ -38,11 +30,7 @@ class Sweep:
         self.active = tuple(active)
         self.start = _start_with_slope(drive, self.active)
         """(y, dy, u, p) -> start state and its derivative by the active numbers."""
-        library = compile_sweep(drive, self.active)
-        if library is None:
-            raise RuntimeError("no compiler")
-        self._function = library.friction_ocp_sweep
-        self._function.restype = None
+        self.kernel: AbstractKernel = compile_sweep(drive, self.active) or InterpretedKernel(drive, self.active)
 
     def run(
         self,
@@ -58,35 +46,61 @@ class Sweep:
 
         `x0` (segments, states), `p` (parameters,), `width` (groups + 1,).
         """
-        nodes, states, outputs = grid.time.size, len(self.drive.state_names), len(self.drive.output_names)
-        segments, columns = len(first) - 1, states + len(self.active)
-        y, end = np.zeros((nodes, outputs)), np.empty((segments, states))
-        dy = np.zeros((nodes, outputs, columns)) if derivatives else None
-        dend = np.empty((segments, columns, states)) if derivatives else None
-        track = np.empty((nodes, states)) if with_states else None
-        arrays = [
-            np.ascontiguousarray(first, dtype=np.int64),
-            grid.dt,
-            grid.substeps,
-            grid.ticks,
-            grid.at_start,
-            grid.at_end,
-            grid.at_node,
-            np.ascontiguousarray(p, dtype=float),
-            np.ascontiguousarray(width, dtype=float),
-            np.ascontiguousarray(x0, dtype=float),
-        ]
-        self._function(
-            ctypes.c_long(segments),
-            *(_pointer(item) for item in arrays),
-            ctypes.c_int(derivatives),
-            *(_pointer(item) for item in (track, y, dy, end, dend)),
-        )
-        return SweepResult(y, end, dy, None if dend is None else dend.transpose(0, 2, 1), track)
+        return self.run_many([SweepRequest(grid, first, x0, p, width, derivatives, with_states)])[0]
+
+    def run_many(self, requests: Sequence[SweepRequest]) -> list[SweepResult]:
+        """Simulate several recordings, side by side where there is more than one processor."""
+        results = [self._empty(request) for request in requests]
+        threads = worker_count() if self.kernel.parallel else 1
+        pieces = _pieces(requests, threads)
+
+        def work(piece: tuple[int, int, int]) -> None:
+            index, begin, stop = piece
+            self.kernel.run(requests[index], begin, stop, results[index])
+
+        if threads > 1 and len(pieces) > 1:
+            list(_pool(threads).map(work, pieces))
+        else:
+            for piece in pieces:
+                work(piece)
+        return results
+
+    def _empty(self, request: SweepRequest) -> SweepResult:
+        drive = self.drive
+        return empty_result(request, len(drive.state_names), len(drive.output_names), len(self.active))
 
 
-def _pointer(array: FloatArray | IntArray | None) -> ctypes.c_void_p:
-    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+def worker_count() -> int:
+    """Return how many threads may work: FRICTION_OCP_THREADS, else the processors of this process."""
+    stated = os.environ.get("FRICTION_OCP_THREADS", "")
+    if stated.isdigit():
+        return max(1, int(stated))
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="sweep")
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def _pieces(requests: Sequence[SweepRequest], threads: int) -> list[tuple[int, int, int]]:
+    """Cut requests into (request, first segment, last segment + 1) of about equal work, the largest first."""
+    steps = [np.add.reduceat(request.grid.substeps, request.first[:-1]) for request in requests]
+    total = sum(int(count.sum()) for count in steps)
+    share = max(total / threads, STEPS_WORTH_A_THREAD)
+    pieces: list[tuple[int, int, int, int]] = []
+    for index, count in enumerate(steps):
+        parts = max(1, min(len(count), round(int(count.sum()) / share)))
+        edges = np.searchsorted(np.cumsum(count), count.sum() * np.arange(1, parts) / parts)
+        cuts = [0, *(int(edge) + 1 for edge in edges), len(count)]
+        pieces += [(int(count[a:b].sum()), index, a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
+    if total < 2 * STEPS_WORTH_A_THREAD:
+        return [(index, 0, len(request.first) - 1) for index, request in enumerate(requests)]
+    return [(index, a, b) for _, index, a, b in sorted(pieces, reverse=True)]
 
 
 def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantShaft, Trajectory
@@ -15,8 +15,7 @@ from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.registry import friction_laws
 from friction_ocp.parameters import Directional
-from friction_ocp.simulation.grid import InputSignal, build_grid
-from friction_ocp.simulation.sweep import Sweep
+from friction_ocp.simulation.grid import APPLY, COMPUTE, Grid, InputSignal, build_grid
 
 PLANT_STEP = 2e-5
 
@@ -130,26 +129,18 @@ def _signal(trajectory: Trajectory | float) -> InputSignal:
 
 @dataclass(frozen=True)
 class Bench:
-    """A stepped drive and its compiled sweep, to be run under any inputs."""
+    """A stepped drive, to be run freely under any inputs, step by step in CasADi's virtual machine."""
 
     drive: Drive
     stepped: SteppedDrive = field(init=False)
-    sweep: Sweep = field(init=False)
+    numbers: np.ndarray = field(init=False)
+    """Values of the parameters in the order of the stepped drive."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stepped", stepped(self.drive))
-        object.__setattr__(self, "sweep", Sweep(self.stepped, ()))
-
-    @cached_property
-    def numbers(self) -> np.ndarray:
-        """Values of the parameters in the order of the stepped drive."""
+        made = stepped(self.drive)
         values = {leaf.path: leaf.value for leaf in drive_leaves(self.drive)}
-        return np.array([float(values[name]) for name in self.stepped.parameter_names])
-
-    @property
-    def exact(self) -> np.ndarray:
-        """Smoothing widths of the exact laws: all zero."""
-        return np.zeros(len(self.stepped.mechanism.topology.roots) + 1)
+        object.__setattr__(self, "stepped", made)
+        object.__setattr__(self, "numbers", np.array([float(values[name]) for name in made.parameter_names]))
 
     def run(
         self,
@@ -164,13 +155,41 @@ class Bench:
         samples = every * np.arange(round(duration / every) + 1)
         signals = [_signal(inputs[name]) for name in self.stepped.input_names]
         grid = build_grid(samples, signals, self.drive.controller, step)
-        start = np.array([[dict(initial or {}).get(name, 0.0) for name in self.stepped.state_names]])
-        last = np.array([0, grid.time.size - 1])
-        done = self.sweep.run(grid, last, start, self.numbers, self.exact + width, with_states=True)
+        start = np.array([dict(initial or {}).get(name, 0.0) for name in self.stepped.state_names])
+        widths = np.full(len(self.stepped.mechanism.topology.roots) + 1, width)
+        states = self._states(grid, start, widths)
+        h = np.append(grid.dt[:-1], grid.dt[-2]) / grid.substeps
+        outputs = self.stepped.output.map(h.size)(states, grid.at_node.T, self.numbers, h, widths)
         at = np.searchsorted(grid.time, samples - 1e-9)
-        columns = dict(zip(self.stepped.state_names, done.states.T, strict=True))
-        columns |= dict(zip(self.stepped.output_names, done.y.T, strict=True))
+        columns = dict(zip(self.stepped.state_names, states, strict=True))
+        columns |= dict(zip(self.stepped.output_names, np.asarray(outputs), strict=True))
         return Run(samples, {name: column[at] for name, column in columns.items()})
+
+    def _states(self, grid: Grid, start: np.ndarray, widths: np.ndarray) -> np.ndarray:
+        """Return (states, n) at the nodes: ticks as they fall due, then the steps up to the next tick at once."""
+        states = np.empty((start.size, grid.time.size))
+        due = np.unique(np.append(np.flatnonzero(grid.ticks), (0, grid.time.size - 1)))
+        x: Any = start
+        for first, last in zip(due, np.append(due[1:], due[-1]), strict=True):
+            for kind in (APPLY, COMPUTE):
+                if grid.ticks[first] & kind:
+                    x = self.stepped.tick(x, grid.at_node[first], self.numbers, kind)
+            states[:, first] = np.asarray(x).ravel()
+            if last > first:
+                count, inputs, h = _substeps(grid, first, last)
+                passed = self.stepped.step.mapaccum(h.size)(x, inputs, self.numbers, h, widths)
+                states[:, first + 1 : last + 1] = np.asarray(passed)[:, np.cumsum(count) - 1]
+                x = passed[:, -1]
+        return states
+
+
+def _substeps(grid: Grid, first: int, last: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the number of steps in each interval, and the midpoint inputs and length of every step."""
+    count = grid.substeps[first:last]
+    interval = np.repeat(np.arange(first, last), count)
+    share = (np.arange(interval.size) - np.repeat(np.cumsum(count) - count, count) + 0.5) / grid.substeps[interval]
+    inputs = grid.at_start[interval] + share[:, None] * (grid.at_end[interval] - grid.at_start[interval])
+    return count, inputs.T, grid.dt[interval] / grid.substeps[interval]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.drive.parts import Channel, Drive, Motor, Transmission
+from friction_ocp.drive.parts import Channel, Drive, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import bind_drive, drive_leaves
@@ -44,10 +44,30 @@ class Case:
     recording_places: tuple[str, ...] = ()
     """Where the recordings stand in the file, if some of those there could not be read."""
 
-    @property
+    @cached_property
     def drive(self) -> Drive:
-        """The drive as read."""
-        return self.problem.drive
+        """The drive as read, but so that it can be looked at further whatever its parts are called.
+
+        A shaft whose name is taken gets another; a part on a shaft that does not exist is put on the first one.
+        """
+        drive = self.problem.drive
+        names: list[str] = []
+        for shaft in drive.shafts:
+            names.append(shaft.name if shaft.name not in names else f"{shaft.name}#{len(names)}")
+
+        def known(name: str) -> str:
+            return name if name in names else names[0]
+
+        transmissions = tuple(
+            replace(item, from_shaft=known(item.from_shaft), to_shaft=known(item.to_shaft))
+            for item in drive.transmissions
+        )
+        return replace(
+            drive,
+            shafts=tuple(replace(shaft, name=name) for shaft, name in zip(drive.shafts, names, strict=True)),
+            transmissions=transmissions,
+            motors=tuple(replace(motor, shaft=known(motor.shaft)) for motor in drive.motors),
+        )
 
     def at(self, place: str) -> str:
         """Return file and place, as findings name them."""
@@ -71,18 +91,26 @@ class Case:
 
     @cached_property
     def bound(self) -> Drive:
-        """The drive with plain numbers."""
-        return bind_drive(self.drive, self.numbers)
+        """The drive with plain numbers; a ratio of zero, by which nothing can be divided, is NaN."""
+        zero = {path: np.nan for path, number in self.numbers.items() if path.endswith(".ratio") and number == 0}
+        return bind_drive(self.drive, {**self.numbers, **zero})
 
     @cached_property
     def topology(self) -> Topology:
-        """Which shafts move together; raises FrictionOcpError where rigid joints form a loop."""
+        """Which shafts move together."""
         return self._joined(self.bound.transmissions)
+
+    def unit(self, path: str) -> str:
+        """Return the SI unit of a number; "1" for the offset of a channel that measures nothing known."""
+        try:
+            return unit_of(self.leaves[path], self.drive)
+        except FrictionOcpError:
+            return "1"
 
     def written(self, path: str) -> str:
         """Return a number with its name and unit: tau_c = 0.45 N m."""
-        unit = unit_of(self.leaves[path], self.drive)
-        return f"{path.rpartition('.')[2]} = {quantity_text(self.numbers[path], unit)}"
+        key = path.rpartition(".friction.")[2] if ".friction." in path else path.partition(".")[2]
+        return f"{key} = {quantity_text(self.numbers[path], self.unit(path))}"
 
     def place(self, path: str) -> str:
         """Return where in the file the number with this path stands."""
@@ -94,7 +122,7 @@ class Case:
         parts: list[tuple[Any, str, str]] = [
             *((item, item.name, f"drive.shafts[{k}]") for k, item in enumerate(drive.shafts)),
             *((item, item.name, f"drive.transmissions[{k}]") for k, item in enumerate(drive.transmissions)),
-            *((item, item.name, self.place_of_motor(item)) for item in drive.motors),
+            *((item, item.name, self.place_of_motor(k)) for k, item in enumerate(drive.motors)),
             *((item, item.name, f"channels.{item.name}") for item in drive.channels),
         ]
         if drive.controller is not None:
@@ -105,10 +133,9 @@ class Case:
             for leaf in leaves(part, name)
         }
 
-    def place_of_motor(self, motor: Motor) -> str:
+    def place_of_motor(self, index: int) -> str:
         """Return where in the file a motor stands; a single one is taken to be `drive.motor`."""
-        motors = self.drive.motors
-        return "drive.motor" if len(motors) == 1 else f"drive.motors[{motors.index(motor)}]"
+        return "drive.motor" if len(self.drive.motors) == 1 else f"drive.motors[{index}]"
 
     def uses(self) -> Iterator[tuple[str, RecordingUse]]:
         """Yield every recording, training first, and where it stands in the file."""
@@ -117,8 +144,7 @@ class Case:
             *(f"recordings.train[{k}]" for k in range(len(problem.train))),
             *(f"recordings.validation[{k}]" for k in range(len(problem.validation))),
         )
-        for place, use in zip(places, problem.recordings, strict=True):
-            yield place, use
+        yield from zip(places, problem.recordings, strict=True)
 
     def at_recording(self, place: str, use: RecordingUse) -> str:
         """Return file, place and recording, as findings name them."""
@@ -147,14 +173,14 @@ class Case:
 
     @cached_property
     def _without_springs(self) -> Topology:
-        try:
-            return self._joined(tuple(replace(item, stiffness=None) for item in self.bound.transmissions))
-        except FrictionOcpError:
-            return self.topology
+        return self._joined(tuple(replace(item, stiffness=None) for item in self.bound.transmissions))
 
     def _joined(self, transmissions: tuple[Transmission, ...]) -> Topology:
-        known = tuple(replace(item, ratio=item.ratio or np.nan) for item in transmissions)
-        return topology(replace(self.bound, transmissions=known))
+        """Return the topology under these transmissions, of single shafts where they form a loop."""
+        try:
+            return topology(replace(self.bound, transmissions=transmissions))
+        except FrictionOcpError:
+            return topology(replace(self.bound, transmissions=()))
 
     def _seen(self, channel: Channel, use: RecordingUse) -> Motion | None:
         """Return the motion that a channel shows at the guesses of its gain and offset."""

@@ -83,10 +83,10 @@ def is_prescribed(drive: Drive) -> bool:
 def motors_are_driven(case: Case) -> Iterator[Finding]:
     """Each motor follows a measured current, torque or voltage, or the controller."""
     drive = case.drive
-    for motor in drive.motors:
+    for k, motor in enumerate(drive.motors):
         if not ways_of_driving(drive, motor) and not is_prescribed(drive):
             allowed = f"an input channel for {motor.name}.current, .torque or .voltage, or a controller"
-            yield Finding(case.at(case.place_of_motor(motor)), f"nothing drives motor '{motor.name}'", allowed)
+            yield Finding(case.at(case.place_of_motor(k)), f"nothing drives motor '{motor.name}'", allowed)
 
 
 def something_moves_the_drive(case: Case) -> Iterator[Finding]:
@@ -99,18 +99,18 @@ def something_moves_the_drive(case: Case) -> Iterator[Finding]:
 
 def motors_are_driven_once(case: Case) -> Iterator[Finding]:
     """A motor that follows its measured current cannot follow a voltage as well."""
-    for motor in case.drive.motors:
+    for k, motor in enumerate(case.drive.motors):
         ways = ways_of_driving(case.drive, motor)
         if len(ways) > 1:
             what = f"motor '{motor.name}' is driven by {' and by '.join(ways)}"
-            yield Finding(case.at(case.place_of_motor(motor)), what, "one of them", "make the others outputs")
+            yield Finding(case.at(case.place_of_motor(k)), what, "one of them", "make the others outputs")
 
 
 def voltage_needs_resistance(case: Case) -> Iterator[Finding]:
     """The current under a voltage follows from the resistance of the winding."""
-    for motor in case.drive.motors:
+    for k, motor in enumerate(case.drive.motors):
         if "voltage" in _kinds_of_driving(case.drive, motor) and motor.resistance is None:
-            where = case.at(f"{case.place_of_motor(motor)}.resistance")
+            where = case.at(f"{case.place_of_motor(k)}.resistance")
             what = f"motor '{motor.name}' is driven by voltage, and its resistance is missing"
             yield Finding(where, what, "a number or {guess, min, max}, in ohm")
 
@@ -224,4 +224,4 @@ WHOLE: tuple[Rule, ...] = (
     controller_has_a_reference,
     duty_controller_has_a_supply,
 )
-"""Rules about what is not there."""
+"""Rules about what has to be there."""

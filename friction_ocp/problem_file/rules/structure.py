@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from friction_ocp.drive.parts import Transmission
+from friction_ocp.drive.topology import topology
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule
@@ -13,7 +14,7 @@ from friction_ocp.problem_file.rules.case import Case, Rule
 
 def parts_have_names_of_their_own(case: Case) -> Iterator[Finding]:
     """No two shafts, motors or transmissions share a name: it is what results call their numbers."""
-    drive = case.drive
+    drive = case.problem.drive
     for kind, parts in (("shafts", drive.shafts), ("motors", drive.motors), ("transmissions", drive.transmissions)):
         for name, count in Counter(part.name for part in parts).items():
             if count > 1:
@@ -23,7 +24,7 @@ def parts_have_names_of_their_own(case: Case) -> Iterator[Finding]:
 def transmissions_join_shafts(case: Case) -> Iterator[Finding]:
     """A transmission lies between two shafts that exist."""
     names = [shaft.name for shaft in case.drive.shafts]
-    for k, item in enumerate(case.drive.transmissions):
+    for k, item in enumerate(case.problem.drive.transmissions):
         for key, name in (("from", item.from_shaft), ("to", item.to_shaft)):
             if name not in names:
                 yield _unknown_shaft(case.at(f"drive.transmissions[{k}].{key}"), name, names)
@@ -35,9 +36,9 @@ def transmissions_join_shafts(case: Case) -> Iterator[Finding]:
 def motors_sit_on_shafts(case: Case) -> Iterator[Finding]:
     """A motor turns a shaft that exists."""
     names = [shaft.name for shaft in case.drive.shafts]
-    for motor in case.drive.motors:
+    for k, motor in enumerate(case.problem.drive.motors):
         if motor.shaft not in names:
-            yield _unknown_shaft(case.at(f"{case.place_of_motor(motor)}.shaft"), motor.shaft, names)
+            yield _unknown_shaft(case.at(f"{case.place_of_motor(k)}.shaft"), motor.shaft, names)
 
 
 def shafts_hang_together(case: Case) -> Iterator[Finding]:
@@ -56,7 +57,7 @@ def shafts_hang_together(case: Case) -> Iterator[Finding]:
 def rigid_joints_form_no_loop(case: Case) -> Iterator[Finding]:
     """Shafts in a loop of rigid joints could not move."""
     try:
-        assert case.topology
+        topology(case.bound)
     except FrictionOcpError as error:
         for finding in error.findings:
             yield Finding(case.at(finding.where), finding.what, finding.allowed, finding.remedy)
@@ -82,11 +83,8 @@ def _unknown_shaft(where: str, name: str, names: list[str]) -> Finding:
 
 
 NAMES: tuple[Rule, ...] = (parts_have_names_of_their_own, transmissions_join_shafts, motors_sit_on_shafts)
-"""Without these no number of the drive has a meaning."""
-
-JOINTS: tuple[Rule, ...] = (rigid_joints_form_no_loop,)
-"""Without these nothing is known of the motion."""
+"""Without these it is not known what else is meant."""
 
 STRUCTURE: tuple[Rule, ...] = (rigid_joints_have_no_play,)
-WHOLE: tuple[Rule, ...] = (shafts_hang_together,)
-"""Rules about what is not there."""
+WHOLE: tuple[Rule, ...] = (shafts_hang_together, rigid_joints_form_no_loop)
+"""Rules about what has to be there."""

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from friction_ocp.drive.units import unit_of
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.expressions import closest, parse, resolve_ties
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction
@@ -65,16 +64,17 @@ def breakaway_is_above_coulomb(case: Case) -> Iterator[Finding]:
     """tau_s, the torque at standstill, is not below tau_c."""
     for path in case.numbers:
         stem, found, direction = path.partition(".tau_s")
-        coulomb = next((item for item in (f"{stem}.tau_c{direction}", f"{stem}.tau_c") if item in case.numbers), None)
-        if found and coulomb is not None and case.numbers[path] < case.numbers[coulomb]:
-            what = f"{_short(case, path)} is below {_short(case, coulomb)}"
-            allowed = "breakaway must be >= Coulomb torque"
-            yield Finding(case.at(case.place(path).partition(".tau_s")[0]), what, allowed)
+        for coulomb in _same_direction(case, f"{stem}.tau_c", direction) if found else ():
+            if case.numbers[path] < case.numbers[coulomb]:
+                what = f"{case.written(path)} is below {case.written(coulomb)}"
+                allowed = "breakaway must be >= Coulomb torque"
+                yield Finding(case.at(case.place(path).partition(".tau_s")[0]), what, allowed)
 
 
-def _short(case: Case, path: str) -> str:
-    key = path.partition(".friction.")[2]
-    return f"{key} = {quantity_text(case.numbers[path], unit_of(case.leaves[path], case.drive))}"
+def _same_direction(case: Case, stem: str, direction: str) -> list[str]:
+    """Return the paths of a number that hold in one direction (".positive"), or in any where it is ""."""
+    found = [path for path in (stem, f"{stem}.positive", f"{stem}.negative") if path in case.numbers]
+    return [path for path in found if not direction or path in (stem, stem + direction)]
 
 
 def polylines_have_their_breaks(case: Case) -> Iterator[Finding]:
@@ -183,7 +183,7 @@ def settings_name_numbers(case: Case) -> Iterator[Finding]:
 def _fitted(case: Case) -> Iterator[tuple[str, Free, str]]:
     for path, leaf in case.leaves.items():
         if isinstance(leaf.value, Free):
-            yield path, leaf.value, unit_of(leaf, case.drive)
+            yield path, leaf.value, case.unit(path)
 
 
 VALUES: tuple[Rule, ...] = (
@@ -202,4 +202,4 @@ WHOLE: tuple[Rule, ...] = (
     constraints_compare_numbers,
     settings_name_numbers,
 )
-"""Rules about what is not there."""
+"""Rules about what has to be there."""

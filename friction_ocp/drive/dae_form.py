@@ -1,0 +1,157 @@
+"""A drive as a differential-algebraic system in continuous time, for the integrators of CasADi.
+
+Friction is single-valued here: its jump at standstill is smoothed over a speed `width`. The exact, set-valued drive
+is the stepped one (stepping.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from friction_ocp.dae import Dae, Variable
+from friction_ocp.drive.kick import through_joint, transmitted_torque
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.stepping import group_angles, group_speeds, recorded
+from friction_ocp.drive.units import feedback_motion, signal_unit, unit_of
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.quantities import si_unit
+
+HELD = "controller.held"
+"""The command of a sampled controller: an input here, constant between its ticks."""
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    """The symbols of a drive that are neither its inputs nor its parameters."""
+
+    angles: ca.SX
+    speeds: ca.SX
+    bristle: ca.SX
+    extra: ca.SX
+    memory: ca.SX
+    torques: ca.SX
+    """(joints,) torques through rigid joints that friction depends on: the algebraic variables."""
+
+    @property
+    def x(self) -> list[ca.SX]:
+        """The states."""
+        return [item for part in (self.angles, self.speeds, self.bristle, self.extra) for item in ca.vertsplit(part)]
+
+
+def dae(drive: Drive, width: float) -> Dae:
+    """Return the drive in continuous time, the sign of its friction smoothed over the speed `width` > 0 of each shaft.
+
+    The torque through a rigid joint is an algebraic variable where friction depends on it. The command of a sampled
+    controller becomes the input `controller.held`. Raises FrictionOcpError for a width that is not positive.
+    """
+    if width <= 0:
+        what = f"width = {width:g} rad/s leaves a jump that no integrator can pass"
+        raise FrictionOcpError(Finding("dae", what, "width > 0", "use the stepped drive for exact friction"))
+    mech = mechanism(drive)
+    symbols = _symbols(mech)
+    at = Motion(group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds), symbols.extra, symbols.memory)
+    torques = mech.applied_torques(at, width)
+    load = _loads(mech, symbols, at, width)
+    friction, rates = _friction(mech, symbols, at, load, width)
+    acceleration = column([_acceleration(mech, g, torques, friction) for g in range(len(mech.topology.roots))])
+    found = column([through_joint(mech, joint, acceleration, torques, friction) for joint in mech.loaded_joints()])
+    turning = [at.v[g] for g in mech.angle_groups]
+    speeding = [acceleration[g] for g in mech.free_groups]
+    outputs = [recorded(mech, channel, at, acceleration) for channel in mech.drive.outputs]
+    return Dae(
+        states=_states(mech, symbols),
+        algebraic=_algebraic(mech, symbols),
+        inputs=_inputs(mech, symbols),
+        parameters=_parameters(drive, mech),
+        outputs=tuple(
+            Variable(channel.name, signal_unit(drive, channel.measures), ca.SX(value))
+            for channel, value in zip(mech.drive.outputs, outputs, strict=True)
+        ),
+        ode=ca.vertcat(column([*turning, *speeding, *rates]), mech.extra_rates(at)),
+        alg=symbols.torques - found,
+    )
+
+
+def _symbols(mech: Mechanism) -> _Symbols:
+    counts = (mech.angle_groups, mech.free_groups, mech.bristles, mech.extra_names)
+    names = iter(mech.state_names)
+    parts = [column([symbol(next(names)) for _ in part]) for part in counts]
+    memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
+    joints = column([symbol(f"{joint.name}.torque") for joint in mech.loaded_joints()])
+    return _Symbols(*parts, memory, joints)
+
+
+def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
+    elastic = {item.name: mech.elastic_torque(item, at, width) for item in mech.topology.elastic}
+    return elastic | {joint.name: symbols.torques[k] for k, joint in enumerate(mech.loaded_joints())}
+
+
+def _friction(
+    mech: Mechanism, symbols: _Symbols, at: Motion, load: dict[str, Any], width: float
+) -> tuple[dict[str, Any], list[Any]]:
+    """Return the friction torque on every shaft, and the rates of the bristles."""
+    friction: dict[str, Any] = {}
+    rates: list[Any] = []
+    deflection = {shaft.name: symbols.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    for shaft in mech.drive.shafts:
+        omega, transmitted = mech.shaft_speed(shaft.name, at.v), transmitted_torque(mech, shaft, load)
+        if shaft.name in deflection:
+            torque, rate = shaft.friction.bristle_torque(omega, deflection[shaft.name], transmitted)
+            rates.append(rate)
+        else:
+            torque = shaft.friction.torque(omega, transmitted, width)
+        friction[shaft.name] = torque
+    return friction, rates
+
+
+def _acceleration(mech: Mechanism, group: int, torques: dict[str, Any], friction: dict[str, Any]) -> Any:
+    """Return the acceleration of a group; 0 where its motion is an input."""
+    if group in mech.prescribed:
+        return 0.0
+    ratio = mech.topology.speed_ratio
+    moving = sum(ratio[name] * (torques[name] - friction[name]) for name in mech.topology.members(group))
+    return moving / mech.inertia(group)
+
+
+def _states(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
+    return tuple(Variable(item.name(), _state_unit(mech.drive, item.name()), item) for item in symbols.x)
+
+
+def _state_unit(drive: Drive, name: str) -> str:
+    if name == "controller.integral":
+        return _command_unit(drive)
+    part, _, signal = name.partition(".")
+    return si_unit("angle", drive.shaft(part).motion) if signal == "friction.z" else signal_unit(drive, name)
+
+
+def _command_unit(drive: Drive) -> str:
+    controller = drive.controller
+    assert controller is not None
+    driven = drive.shaft(drive.motors[0].shaft) if drive.motors else drive.shafts[0]
+    return "1" if controller.type == "duty" else si_unit(controller.output, driven.motion)
+
+
+def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
+    units = [si_unit("torque", mech.drive.shaft(joint.to_shaft).motion) for joint in mech.loaded_joints()]
+    items = ca.vertsplit(symbols.torques)
+    return tuple(Variable(item.name(), unit, item) for item, unit in zip(items, units, strict=True))
+
+
+def _inputs(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
+    measures = {channel.name: channel.measures for channel in mech.drive.inputs}
+    given = [
+        Variable(name, signal_unit(mech.drive, measures[name.rstrip("'")]) + ("/s" if name.endswith("'") else ""), item)
+        for name, item in mech.inputs.items()
+    ]
+    held = [item for item in ca.vertsplit(symbols.memory) if item.is_symbolic()]
+    return (*given, *(Variable(HELD, _command_unit(mech.drive), item) for item in held))
+
+
+def _parameters(drive: Drive, mech: Mechanism) -> tuple[Variable, ...]:
+    units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
+    return tuple(Variable(name, units[name], item) for name, item in mech.parameters.items())

@@ -1,0 +1,358 @@
+"""The same program solved by Ipopt with the Gauss-Newton Hessian: an independent check of `solve_gauss_newton`.
+
+Source: Waechter & Biegler 2006, through CasADi's `nlpsol`.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, trial_step
+from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.estimation.program import Linearisation, Point, Program
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "no_nlp_grad": True,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.nlp_scaling_method": "none",
+    "ipopt.mu_strategy": "adaptive",
+    "ipopt.bound_relax_factor": 0.0,
+    "ipopt.bound_push": 1e-4,
+    "ipopt.bound_frac": 1e-4,
+    "ipopt.acceptable_tol": 1e10,
+    "ipopt.acceptable_dual_inf_tol": 1e10,
+    "ipopt.acceptable_compl_inf_tol": 1e-7,
+    "ipopt.acceptable_iter": 3,
+}
+"""Objective and variables are scaled here. A point is acceptable when three steps in a row gained next to nothing,
+the criterion of `solve_gauss_newton`."""
+
+CONVERGED = {
+    "Solve_Succeeded": "the optimality conditions hold",
+    "Solved_To_Acceptable_Level": "three steps in a row gained next to nothing",
+}
+FAILED = {
+    "Infeasible_Problem_Detected": "no values within the bounds meet the constraints; widen the bounds or drop one",
+    "Diverging_Iterates": "the iterates diverge; give bounds to the parameters",
+    "Invalid_Number_Detected": "the simulation breaks down; start from other guesses or narrow the bounds",
+}
+STUCK = ("Search_Direction_Becomes_Too_Small", "Restoration_Failed", "Error_In_Step_Computation")
+
+
+def solve_ipopt(
+    program: Program, start: Point, tolerances: Tolerances = Tolerances(), watch: Watch | None = None
+) -> Solution:
+    """Minimise a program from a start; the contract is that of `solve_gauss_newton`.
+
+    A KeyboardInterrupt, from the keyboard or from `watch`, ends Ipopt after the present evaluation and is raised then.
+    """
+    point = Point(program.space.clip(start.theta), start.nodes)
+    system = program.linearise(point)
+    if not np.isfinite(system.objective):
+        return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
+    layout = NlpLayout.of(program, point)
+    evaluations = _Evaluations(program, layout, point, watch)
+    with _deferred_interrupt(evaluations):
+        status, iterations, x = _run(program.space, layout, evaluations, tolerances)
+    if evaluations.stop is not None:
+        raise evaluations.stop
+    end = layout.point(x, point)
+    end = Point(program.space.clip(end.theta), end.nodes)
+    return _solution(program, end, status, iterations, tolerances)
+
+
+def _solution(program: Program, end: Point, status: str, iterations: int, tolerances: Tolerances) -> Solution:
+    system = program.linearise(end)
+    step, predicted = trial_step(program.space, end, system, 1e-6)
+    relative = predicted / max(system.objective, 1e-300)
+    if status in CONVERGED:
+        return Solution(end, system.objective, iterations, True, CONVERGED[status])
+    if status in STUCK and relative <= tolerances.stalled:
+        return Solution(end, system.objective, iterations, True, "no step decreases the objective further")
+    if status == "Maximum_Iterations_Exceeded":
+        worst = int(np.argmax(np.abs(step.theta - end.theta) / program.space.scale))
+        text = (
+            f"iteration limit reached; {program.space.names[worst]} still wants to move from {end.theta[worst]:.3g} to "
+            f"{step.theta[worst]:.3g}; raise max_iterations or start from better guesses"
+        )
+    elif status in STUCK:
+        text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
+    else:
+        text = FAILED.get(status, f"Ipopt stopped with {status}")
+    return Solution(end, system.objective, iterations, False, text)
+
+
+@dataclass(frozen=True)
+class NlpLayout:
+    """Where every variable and every Hessian entry stands: nodes of all recordings, then the parameters.
+
+    Nodes that the measurement gives are no variables. All variables are scaled to the size of one.
+    """
+
+    index: tuple[IntArray, ...]
+    """By recording (segments, states): the variable of each node state, -1 where it is none."""
+    theta: IntArray
+    """(parameters,) the variable of each parameter."""
+    scale: FloatArray
+    """(variables,) value of one unit of each variable."""
+    hessian: ca.Sparsity
+    """Upper triangle."""
+    entries: IntArray
+    """Which of the stacked Hessian blocks stand in the upper triangle, column by column."""
+
+    @classmethod
+    def of(cls, program: Program, point: Point) -> NlpLayout:
+        """Lay out the variables of a program; `point` gives the typical size of the states."""
+        index: list[IntArray] = []
+        count = 0
+        for cut, nodes in zip(program.segments, point.nodes, strict=True):
+            variables = np.full(nodes.shape, -1, dtype=np.int64)
+            free = nodes[cut.measured :].size
+            variables[cut.measured :] = (count + np.arange(free)).reshape(-1, nodes.shape[1])
+            index.append(variables)
+            count += free
+        theta = count + np.arange(point.theta.size)
+        scale = np.ones(count + theta.size)
+        size = _state_size(point)
+        for variables in index:
+            scale[variables[variables >= 0]] = np.broadcast_to(size, variables.shape)[variables >= 0]
+        scale[theta] = program.space.scale
+        hessian, entries = _pattern(tuple(index), theta)
+        return cls(tuple(index), theta, scale, hessian, entries)
+
+    def pack(self, theta: FloatArray, nodes: Sequence[FloatArray]) -> FloatArray:
+        """Return the vector of variables, not scaled, of parameters and node states (or their gradients)."""
+        x = np.zeros(self.scale.size)
+        for variables, values in zip(self.index, nodes, strict=True):
+            x[variables[variables >= 0]] = values[variables >= 0]
+        x[self.theta] = theta
+        return x
+
+    def point(self, x: FloatArray, like: Point) -> Point:
+        """Return the point of scaled variables; nodes that are no variables are those of `like`."""
+        values = x * self.scale
+        nodes = [np.where(index >= 0, values[index], old) for index, old in zip(self.index, like.nodes, strict=True)]
+        return Point(values[self.theta], tuple(nodes))
+
+    def hessian_values(self, system: Linearisation) -> FloatArray:
+        """Return the entries of the upper triangle in scaled variables, column by column."""
+        blocks = [(item.node_node, item.node_next, item.node_theta) for item in system.blocks]
+        stacked = np.concatenate([block.ravel() for item in (*blocks, (system.theta_theta,)) for block in item])
+        row, column = (np.asarray(axis) for axis in self.hessian.get_triplet())
+        return stacked[self.entries] * self.scale[row] * self.scale[column]
+
+
+def _state_size(point: Point) -> FloatArray:
+    spread = np.sqrt(np.mean(np.concatenate(point.nodes) ** 2, axis=0))
+    return np.where(spread > 0, spread, 1.0)
+
+
+def _pattern(index: tuple[IntArray, ...], theta: IntArray) -> tuple[ca.Sparsity, IntArray]:
+    """Return the pattern of the Hessian and where its entries stand in the stacked blocks."""
+    rows: list[IntArray] = []
+    columns: list[IntArray] = []
+    for variables in index:
+        border = np.broadcast_to(theta, (len(variables), theta.size))
+        for left, right in ((variables, variables), (variables[:-1], variables[1:]), (variables, border)):
+            pairs = np.broadcast_arrays(left[:, :, None], right[:, None, :])
+            rows.append(pairs[0].ravel())
+            columns.append(pairs[1].ravel())
+    rows.append(np.repeat(theta, theta.size))
+    columns.append(np.tile(theta, theta.size))
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    chosen = np.flatnonzero((row >= 0) & (column >= 0) & (row <= column))
+    chosen = chosen[np.lexsort((row[chosen], column[chosen]))]
+    count = theta[-1] + 1
+    return ca.Sparsity.triplet(count, count, row[chosen].tolist(), column[chosen].tolist()), chosen
+
+
+class _Evaluations:
+    """What Ipopt asks for; the program is linearised once a point.
+
+    An exception must not cross Ipopt: it is kept in `stop`, and Ipopt is told at the end of its iteration.
+    """
+
+    def __init__(self, program: Program, layout: NlpLayout, start: Point, watch: Watch | None) -> None:
+        self.program, self.layout, self.start, self.watch = program, layout, start, watch
+        self.stop: BaseException | None = None
+        self._system = program.linearise(start)
+        self._at = b""
+        self.factor = 1.0 / max(self._system.objective, 1e-300)
+        self._iteration = 0
+
+    def objective(self, x: FloatArray) -> float:
+        """Return the scaled objective; not a number where the simulation breaks down."""
+        value = self._linearised(x).objective
+        return value * self.factor if np.isfinite(value) else np.nan
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Return the gradient of the scaled objective by the scaled variables."""
+        system = self._linearised(x)
+        packed = self.layout.pack(system.theta_gradient, [item.node_gradient for item in system.blocks])
+        return packed * self.layout.scale * self.factor
+
+    def hessian(self, x: FloatArray, weight: float) -> FloatArray:
+        """Return the Gauss-Newton Hessian of `weight` times the scaled objective."""
+        return self.layout.hessian_values(self._linearised(x)) * self.factor * weight
+
+    def margins(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the constraints, which must be >= 0, and their Jacobian by the scaled parameters."""
+        theta = self.layout.point(x, self.start).theta
+        values, rows = constraint_rows(self.program.space, theta)
+        return values, rows * self.layout.scale[self.layout.theta]
+
+    def report(self, x: FloatArray) -> bool:
+        """Tell `watch` of an iterate; return whether Ipopt must stop."""
+        try:
+            if self._iteration and self.watch is not None and self.stop is None:
+                self.watch(self._iteration, self._linearised(x).objective, self.layout.point(x, self.start))
+        except BaseException as error:
+            self.stop = self.stop or error
+        self._iteration += 1
+        return self.stop is not None
+
+    def _linearised(self, x: FloatArray) -> Linearisation:
+        key = x.tobytes()
+        if key != self._at and self.stop is None:
+            try:
+                self._system = self.program.linearise(self.layout.point(x, self.start))
+                self._at = key
+            except BaseException as error:
+                self.stop = self.stop or error
+        return self._system
+
+
+def constraint_rows(space: ParameterSpace, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the values of the constraints and (constraints, parameters) their Jacobian."""
+    if space.constraints is None:
+        return np.zeros(0), np.zeros((0, theta.size))
+    values, rows = space.constraints(theta)
+    return np.asarray(values).ravel(), np.asarray(rows).reshape(-1, theta.size)
+
+
+@contextmanager
+def _deferred_interrupt(evaluations: _Evaluations) -> Iterator[None]:
+    """Let Ctrl-C set `stop` instead of raising inside Ipopt."""
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def remember(*_: object) -> None:
+        evaluations.stop = evaluations.stop or KeyboardInterrupt()
+
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+Evaluate = Callable[[list[ca.DM]], list[Any]]
+
+
+class _Callback(ca.Callback):
+    """A Python function with named inputs and outputs as a CasADi function."""
+
+    def __init__(
+        self, name: str, inputs: dict[str, ca.Sparsity], outputs: dict[str, ca.Sparsity], evaluate: Evaluate
+    ) -> None:
+        ca.Callback.__init__(self)
+        self._inputs, self._outputs, self._evaluate = inputs, outputs, evaluate
+        self.construct(name, {})
+
+    def get_n_in(self) -> int:
+        return len(self._inputs)
+
+    def get_n_out(self) -> int:
+        return len(self._outputs)
+
+    def get_name_in(self, i: int) -> str:
+        return list(self._inputs)[i]
+
+    def get_name_out(self, i: int) -> str:
+        return list(self._outputs)[i]
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return list(self._inputs.values())[i]
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:
+        return list(self._outputs.values())[i]
+
+    def eval(self, arg: list[ca.DM]) -> list[Any]:
+        return self._evaluate(arg)
+
+
+def _column(argument: ca.DM) -> FloatArray:
+    return np.asarray(argument).ravel()
+
+
+def _run(
+    space: ParameterSpace, layout: NlpLayout, evaluations: _Evaluations, tolerances: Tolerances
+) -> tuple[str, int, FloatArray]:
+    """Return Ipopt's status, its number of iterations and its last iterate in scaled variables."""
+    functions = _functions(layout, evaluations)
+    options = OPTIONS | {
+        "ipopt.max_iter": tolerances.max_iterations,
+        "ipopt.tol": tolerances.decrease,
+        "ipopt.acceptable_obj_change_tol": tolerances.progress,
+        **{key: functions[key] for key in ("grad_f", "jac_g", "hess_lag", "iteration_callback")},
+    }
+    solver = ca.nlpsol("identify", "ipopt", functions["nlp"], options)
+    start = evaluations.start
+    limits = {name: np.full(layout.scale.size, bound) for name, bound in (("lbx", -np.inf), ("ubx", np.inf))}
+    limits["lbx"][layout.theta], limits["ubx"][layout.theta] = space.lower, space.upper
+    found = solver(
+        x0=layout.pack(start.theta, start.nodes) / layout.scale,
+        lbg=0.0,
+        ubg=np.inf,
+        **{name: bound / layout.scale for name, bound in limits.items()},
+    )
+    stats = solver.stats()
+    return stats["return_status"], int(stats["iter_count"]), _column(found["x"])
+
+
+def _functions(layout: NlpLayout, evaluations: _Evaluations) -> dict[str, _Callback]:
+    x, rows = ca.Sparsity.dense(layout.scale.size, 1), len(evaluations.margins(np.ones(layout.scale.size))[0])
+    scalar, none, g = ca.Sparsity.dense(1, 1), ca.Sparsity.dense(0, 1), ca.Sparsity.dense(rows, 1)
+    jacobian = ca.Sparsity.dense(rows, len(layout.theta))
+    jacobian = ca.horzcat(ca.Sparsity(rows, layout.scale.size - len(layout.theta)), jacobian)
+    at, results = {"x": x, "p": none}, {"x": x, "f": scalar, "g": g, "lam_x": x, "lam_g": g, "lam_p": none}
+
+    def values(arg: list[ca.DM]) -> list[Any]:
+        return [evaluations.objective(_column(arg[0])), evaluations.margins(_column(arg[0]))[0]]
+
+    def gradient(arg: list[ca.DM]) -> list[Any]:
+        return [evaluations.objective(_column(arg[0])), evaluations.gradient(_column(arg[0]))]
+
+    def slopes(arg: list[ca.DM]) -> list[Any]:
+        margins, by_theta = evaluations.margins(_column(arg[0]))
+        return [margins, ca.DM(jacobian, by_theta.ravel(order="F"))]
+
+    def hessian(arg: list[ca.DM]) -> list[Any]:
+        return [ca.DM(layout.hessian, evaluations.hessian(_column(arg[0]), float(arg[2])))]
+
+    def report(arg: list[ca.DM]) -> list[Any]:
+        return [evaluations.report(_column(arg[0]))]
+
+    return {
+        "nlp": _Callback("nlp", at, {"f": scalar, "g": g}, values),
+        "grad_f": _Callback("nlp_grad_f", at, {"f": scalar, "grad_f_x": x}, gradient),
+        "jac_g": _Callback("nlp_jac_g", at, {"g": g, "jac_g_x": jacobian}, slopes),
+        "hess_lag": _Callback(
+            "nlp_hess_l", at | {"lam_f": scalar, "lam_g": g}, {"hess": layout.hessian}, hessian
+        ),
+        "iteration_callback": _Callback("report", results, {"stop": scalar}, report),
+    }

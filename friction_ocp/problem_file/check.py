@@ -1,0 +1,43 @@
+"""Every rule about a problem, run at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import chain
+
+from friction_ocp.errors import Finding
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.problem_file.rules import excitation, recordings, signals, structure, values
+from friction_ocp.problem_file.rules.case import Case, Rule
+
+MODEL = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *recordings.NAMES)
+"""Rules about what stands in the file, whatever else is missing there."""
+WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE)
+"""Rules about what has to be there."""
+
+
+def check(problem: Problem) -> tuple[Finding, ...]:
+    """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file."""
+    doubts = (*recordings.RECORDINGS, *excitation.EXCITATION)
+    return _run(Case(problem), (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
+
+
+def check_file(problem: Problem) -> tuple[Finding, ...]:
+    """Return the errors of the file itself: not of its recordings, and not whether there is something to fit."""
+    return _errors(_run(Case(problem), MODEL, WHOLE))
+
+
+def check_rest(problem: Problem, recording_places: tuple[str, ...]) -> tuple[Finding, ...]:
+    """Return the errors of what is left of a problem whose faulty parts were taken out."""
+    return _errors(_run(Case(problem, recording_places), (*MODEL, *recordings.RECORDINGS), ()))
+
+
+def _run(case: Case, rules: Iterable[Rule], if_named: Iterable[Rule]) -> tuple[Finding, ...]:
+    """Run all rules; those of `if_named` only if every part is found under its name."""
+    found = list(chain.from_iterable(rule(case) for rule in structure.NAMES))
+    further = (*rules,) if found else (*rules, *if_named)
+    return tuple(dict.fromkeys([*found, *chain.from_iterable(rule(case) for rule in further)]))
+
+
+def _errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(finding for finding in findings if finding.severity == "error")

@@ -1,0 +1,119 @@
+"""From a problem file to a problem: read, refuse with everything that is wrong, or build."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.problem_file.check import check, check_file, check_rest
+from friction_ocp.problem_file.document import Document, read_document
+from friction_ocp.problem_file.salvage import read_section, salvage
+from friction_ocp.problem_file.schema import ProblemSection
+from friction_ocp.recording.hdf5 import read_recording
+from friction_ocp.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A recording as the file lists it."""
+
+    kind: str
+    index: int
+    file: str
+    set: Mapping[str, float]
+
+    @property
+    def place(self) -> str:
+        return f"recordings.{self.kind}[{self.index}]"
+
+
+def load_problem(path: str | Path) -> Problem:
+    """Read a problem file and its recordings.
+
+    Raises FrictionOcpError with everything that is wrong with the file, and, once anything is, with the recordings
+    too. What only a fit needs, and what is merely doubtful, is left to `check`.
+    """
+    path = Path(path)
+    document = read_document(path)
+    section, faults = read_section(document.content)
+    uses, findings = _read_recordings(document)
+    findings = [*(fault.finding(str(path)) for fault in faults), *findings]
+    intact = section is not None and not findings
+    section = section or salvage(document.content, faults)
+    if section is None:
+        raise FrictionOcpError(findings)
+    problem = _build(section, uses, document)
+    if not intact:
+        raise FrictionOcpError([*findings, *check_rest(problem, tuple(entry.place for entry, _ in uses))])
+    if check_file(problem):
+        raise FrictionOcpError([finding for finding in check(problem) if finding.severity == "error"])
+    return problem
+
+
+def _build(section: ProblemSection, uses: list[tuple[_Entry, RecordingUse]], document: Document) -> Problem:
+    return Problem(
+        title=section.title or document.path.stem,
+        drive=section.build_drive(),
+        train=tuple(use for entry, use in uses if entry.kind == "train"),
+        validation=tuple(use for entry, use in uses if entry.kind == "validation"),
+        estimation=section.estimation.build(),
+        constraints=tuple(section.constraints),
+        question=document.head,
+        path=document.path,
+        diagnosis=section.diagnosis.model_dump(exclude_unset=True),
+        limits=section.limits.model_dump(exclude_unset=True),
+    )
+
+
+def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, RecordingUse]], list[Finding]]:
+    """Read every recording that the file lists, each file once."""
+    findings: list[Finding] = []
+    uses: list[tuple[_Entry, RecordingUse]] = []
+    known: dict[Path, Recording | FrictionOcpError] = {}
+    for entry in _entries(document.content):
+        path = recording_path(document.path, entry.file)
+        if path not in known:
+            known[path] = _read(path)
+        recording = known[path]
+        if isinstance(recording, Recording):
+            uses.append((entry, RecordingUse(recording, entry.set)))
+        else:
+            place = f"{document.path}: {entry.place}"
+            findings += [
+                Finding(f"{place}: {item.where}", item.what, item.allowed, item.remedy) for item in recording.findings
+            ]
+    return uses, findings
+
+
+def _read(path: Path) -> Recording | FrictionOcpError:
+    try:
+        return read_recording(path)
+    except FrictionOcpError as error:
+        return error
+
+
+def recording_path(problem: Path, file: str) -> Path:
+    """Return the path of a recording that a problem file names."""
+    return Path(os.path.normpath(problem.parent / file))
+
+
+def _entries(content: Mapping[str, Any]) -> Iterator[_Entry]:
+    """Yield the recordings that are listed, past all entries that are none; the schema complains about those."""
+    listed: Any = content.get("recordings")
+    for kind in ("train", "validation"):
+        entries: Any = cast(dict[str, Any], listed).get(kind) if isinstance(listed, dict) else None
+        for index, entry in enumerate(cast(list[Any], entries) if isinstance(entries, list) else []):
+            keys = cast(dict[str, Any], entry if isinstance(entry, dict) else {"file": entry})
+            file, numbers = keys.get("file"), keys.get("set", {})
+            if isinstance(file, str):
+                yield _Entry(kind, index, file, _numbers(numbers))
+
+
+def _numbers(value: Any) -> Mapping[str, float]:
+    items = cast(dict[str, Any], value).items() if isinstance(value, dict) else ()
+    return {key: float(item) for key, item in items if isinstance(item, (int, float))}

@@ -1,0 +1,170 @@
+"""Rules about the recordings: what they hold, in what unit, and whether it can be true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friction_ocp.drive.parts import Channel
+from friction_ocp.drive.units import signal_unit
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.expressions import closest
+from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
+from friction_ocp.problem_file.rules.power import contradicts
+from friction_ocp.problem_file.rules.signals import is_driving
+from friction_ocp.recording.checks import check_recording
+from friction_ocp.recording.conditioning import high_frequency_noise, is_clipped
+from friction_ocp.recording.recording import Channel as RecordedChannel
+from friction_ocp.recording.recording import FloatArray
+
+_STRAIGHT = 1e-9
+"""Fourth differences of straight ramps and plateaus, as a share of the range: only rounding."""
+
+
+def recordings_are_sound(case: Case) -> Iterator[Finding]:
+    """Time rises, and no channel is empty, infinite or all NaN."""
+    for place, use in case.uses():
+        yield from check_recording(use.recording, case.at_recording(place, use))
+
+
+def recordings_have_names_of_their_own(case: Case) -> Iterator[Finding]:
+    """Results are filed by the name of the recording, and a held-out recording is not trained on."""
+    first: dict[str, tuple[str, str]] = {}
+    for place, use in case.uses():
+        file = str(use.recording.path or use.name)
+        other, other_file = first.setdefault(use.name, (place, file))
+        if other == place:
+            continue
+        where = case.at_recording(place, use)
+        if file != other_file:
+            yield Finding(where, f"'{use.name}' is also the name of {other}", remedy="rename one of the files")
+        else:
+            what = f"this file also stands in {other}"
+            yield Finding(where, what, remedy="validate on a recording that is not trained on", severity="warning")
+
+
+def recordings_have_the_channels(case: Case) -> Iterator[Finding]:
+    """Every channel of the problem is in every recording."""
+    for place, use in case.uses():
+        there = list(use.recording.channels)
+        for channel in case.drive.channels:
+            if channel.name not in there:
+                what = f"the recording has no channel '{channel.name}'"
+                allowed = f"it has {', '.join(there)}"
+                yield Finding(case.at_recording(place, use), what, allowed, closest(channel.name, there))
+
+
+def units_fit_signals(case: Case) -> Iterator[Finding]:
+    """A channel is recorded in a unit of what it measures."""
+    for where, channel, recorded in case.recorded():
+        try:
+            expected = signal_unit(case.drive, channel.measures)
+        except FrictionOcpError:
+            continue
+        if recorded.unit != expected:
+            what = f"channel '{channel.name}' is in {recorded.unit}, but {channel.measures} is in {expected}"
+            allowed = f"a unit that converts to {expected}"
+            yield Finding(where, what, allowed, "correct the unit in the recording, or measures")
+
+
+def channels_are_not_clipped(case: Case) -> Iterator[Finding]:
+    """A measurement does not run into the end of its range.
+
+    Set points are left out; an input of nothing but ramps and plateaus may be a command, which is only doubtful.
+    """
+    for where, channel, recorded in case.recorded():
+        if _is_command(channel) or not is_clipped(recorded.values):
+            continue
+        low, high = float(np.nanmin(recorded.values)), float(np.nanmax(recorded.values))
+        limits = f"{quantity_text(low, recorded.unit)} or {quantity_text(high, recorded.unit)}"
+        doubtful = channel.role == "input" and _is_straight(recorded)
+        yield Finding(
+            where,
+            f"channel '{channel.name}' is clipped: it stays at its extremes of {limits}",
+            remedy="record it with a wider range, or cut that part out",
+            severity="warning" if doubtful else "error",
+        )
+
+
+def _is_command(channel: Channel) -> bool:
+    return channel.part in ("reference", "temperature") or channel.signal in (
+        "enable",
+        "supply_voltage",
+        "current_command",
+    )
+
+
+def _is_straight(recorded: RecordedChannel) -> bool:
+    spread = float(np.nanmax(recorded.values) - np.nanmin(recorded.values))
+    return not high_frequency_noise(recorded.time, recorded.values) > _STRAIGHT * spread
+
+
+def inputs_move(case: Case) -> Iterator[Finding]:
+    """What drives the machine changes in at least one training recording."""
+    driving = [channel for channel in case.drive.inputs if is_driving(case.drive, channel)]
+    still = {channel.name: level for channel in driving if (level := _only_level(case, channel)) is not None}
+    for name, level in still.items():
+        what = f"input '{name}' never moves: it is {level} throughout all training recordings"
+        alone = len(still) == len(driving)
+        remedy = "record an excitation, or correct which channel is the input"
+        yield Finding(case.at(f"channels.{name}"), what, remedy=remedy, severity="error" if alone else "warning")
+
+
+def motors_are_enabled(case: Case) -> Iterator[Finding]:
+    """A motor that is never enabled does not turn."""
+    for channel in case.drive.inputs:
+        present = _pooled(case, channel)
+        if channel.signal == "enable" and present.size and not bool(np.any(present > 0.5)):
+            what = f"'{channel.name}' never exceeds 0.5: motor '{channel.part}' is never enabled"
+            yield Finding(case.at(f"channels.{channel.name}"), what, "1 while the motor is driven, 0 while not")
+
+
+def _only_level(case: Case, channel: Channel) -> str | None:
+    """Return the value that an input always has, None where it moves or is not there."""
+    present = _pooled(case, channel)
+    if not present.size or float(np.ptp(present)) > 1e-9 * float(np.max(np.abs(present))):
+        return None
+    unit = next(recorded.unit for _, other, recorded in case.recorded() if other is channel)
+    return quantity_text(float(present[0]), unit)
+
+
+def _pooled(case: Case, channel: Channel) -> FloatArray:
+    names = [use.recording.channels.get(channel.name) for use in case.problem.train]
+    values = [recorded.values[np.isfinite(recorded.values)] for recorded in names if recorded is not None]
+    return np.concatenate(values) if values else np.empty(0)
+
+
+def current_and_motion_agree(case: Case) -> Iterator[Finding]:
+    """The recorded power can be that of a body with friction: it would not be if a sign were wrong."""
+    if len(case.drive.motors) != 1:
+        return
+    motor = case.drive.motors[0]
+    sign = float(np.sign(case.numbers.get(f"{motor.name}.torque_constant", 1.0)))
+    weights = [shaft.name for shaft in case.drive.shafts if shaft.gravity is not None]
+    for place, use in case.uses():
+        motion = case.motion(motor.shaft, use, rigidly=True)
+        heavy = [seen for name in weights if (seen := case.motion(name, use)) is not None]
+        for channel in case.drive.channels:
+            recorded = use.recording.channels.get(channel.name)
+            effort = channel.part == motor.name and channel.signal in ("current", "torque", "voltage")
+            if motion is None or recorded is None or not effort:
+                continue
+            gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
+            if gain and contradicts(motion, recorded.time, sign * (recorded.values - offset) / gain, heavy):
+                what = f"channel '{channel.name}' and the motion of shaft '{motor.shaft}' have opposite signs"
+                allowed = "a positive torque accelerates in the positive direction"
+                remedy = f"set the gain of '{channel.name}' to -1, or correct the sign of the position"
+                yield Finding(case.at_recording(place, use), what, allowed, remedy)
+
+
+NAMES: tuple[Rule, ...] = (recordings_have_names_of_their_own,)
+RECORDINGS: tuple[Rule, ...] = (
+    recordings_are_sound,
+    recordings_have_the_channels,
+    units_fit_signals,
+    channels_are_not_clipped,
+    motors_are_enabled,
+    inputs_move,
+    current_and_motion_agree,
+)

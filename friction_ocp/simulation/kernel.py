@@ -1,0 +1,71 @@
+"""What a sweep asks for and what it gives, and the interface of those who compute it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """Segments of one recording to simulate; segment j covers the grid's nodes first[j] .. first[j + 1]."""
+
+    grid: Grid
+    first: IntArray
+    """(segments + 1,) first node of each segment; last the last node of the recording."""
+    x0: FloatArray
+    """(segments, states) state at the start of each segment."""
+    p: FloatArray
+    """(parameters,) all numbers of the drive."""
+    width: FloatArray
+    """(groups + 1,) smoothing; zeros are exact."""
+    derivatives: bool = False
+    with_states: bool = False
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Outputs at every node and states at every segment's end; derivatives by [initial state, active parameters]."""
+
+    y: FloatArray
+    """(n, outputs); at a node that closes a segment the value of the segment that begins there."""
+    end: FloatArray
+    """(segments, states)."""
+    dy: FloatArray | None = None
+    """(n, outputs, states + active)."""
+    dend: FloatArray | None = None
+    """(segments, states, states + active)."""
+    states: FloatArray | None = None
+    """(n, states), where asked for."""
+
+
+class AbstractKernel(ABC):
+    """Computes sweeps of one drive."""
+
+    parallel: ClassVar[bool] = False
+    """Whether several threads may run it, and gain from that."""
+
+    @abstractmethod
+    def run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
+        """Simulate segments `begin` .. `stop` - 1 of a request and write their rows of `into`.
+
+        `into.dend` is (segments, states, columns) as a view of memory in the order (segments, columns, states).
+        """
+
+
+def empty_result(request: SweepRequest, states: int, outputs: int, active: int) -> SweepResult:
+    """Return the arrays that a kernel fills."""
+    nodes, segments, columns = request.grid.time.size, len(request.first) - 1, states + active
+    wanted = request.derivatives
+    return SweepResult(
+        y=np.zeros((nodes, outputs)),
+        end=np.empty((segments, states)),
+        dy=np.zeros((nodes, outputs, columns)) if wanted else None,
+        dend=np.empty((segments, columns, states)).transpose(0, 2, 1) if wanted else None,
+        states=np.empty((nodes, states)) if request.with_states else None,
+    )

@@ -1,0 +1,437 @@
+"""Every kind of bad input is found, at its place in the file, with what is allowed and what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from problem_workshop import Workshop
+
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.problem_file.load import load_problem
+
+Content = dict[str, Any]
+
+
+def put(place: str, value: Any) -> Callable[[Content], None]:
+    """Return an edit that puts a value at a place such as drive.shafts.0.inertia."""
+
+    def spoil(content: Content) -> None:
+        node: Any = content
+        *keys, last = [int(key) if key.isdigit() else key for key in place.split("/")]
+        for key in keys:
+            node = node[key]
+        node[last] = value
+
+    return spoil
+
+
+def drop(place: str) -> Callable[[Content], None]:
+    """Return an edit that removes a key."""
+
+    def spoil(content: Content) -> None:
+        node: Any = content
+        *keys, last = [int(key) if key.isdigit() else key for key in place.split("/")]
+        for key in keys:
+            node = node[key]
+        del node[last]
+
+    return spoil
+
+
+def several(*edits: Callable[[Content], None]) -> Callable[[Content], None]:
+    def spoil(content: Content) -> None:
+        for edit in edits:
+            edit(content)
+
+    return spoil
+
+
+SHAFT = "drive/shafts/0"
+FRICTION = f"{SHAFT}/friction"
+DUTY = {"type": "duty", "feedback": "position", "kp": 1.0}
+SECOND_SHAFT = {"name": "arm", "inertia": 0.1}
+TWO_SHAFTS = [{"name": "load", "inertia": 0.1}, SECOND_SHAFT]
+LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
+
+FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "unknown key": (
+        put(f"{SHAFT}/inerta", 1.0),
+        "drive.shafts[0].inerta: unknown key 'inerta'; available: name, inertia, friction, gravity, external_torque, "
+        "motion; did you mean 'inertia'?",
+    ),
+    "unknown key of a law": (put(f"{FRICTION}/sigma0", 1.0), "drive.shafts[0].friction.sigma0: unknown key 'sigma0'; "),
+    "unknown law": (
+        put(FRICTION, {"law": "lugree", "tau_c": 1}),
+        "drive.shafts[0].friction.law: unknown friction law 'lugree'; available: none, coulomb, viscous, ",
+    ),
+    "close law": (put(f"{FRICTION}/law", "lugree"), "did you mean 'lugre'?"),
+    "missing key": (drop(f"{SHAFT}/inertia"), "drive.shafts[0].inertia: this key is missing; a number, {guess"),
+    "missing number of a law": (drop(f"{FRICTION}/omega_s"), "drive.shafts[0].friction.omega_s: this key is missing"),
+    "not a number": (put(f"{SHAFT}/inertia", "heavy"), "drive.shafts[0].inertia: this is 'heavy'; a number, {guess"),
+    "not finite": (put(f"{SHAFT}/inertia", float("nan")), "drive.shafts[0].inertia: this is nan; a number"),
+    "fitted without guess": (put(f"{SHAFT}/inertia", {"min": 0}), "drive.shafts[0].inertia.guess: this key is missing"),
+    "direction of an inertia": (put(f"{SHAFT}/inertia", {"positive": 1, "negative": 2}), "only numbers of friction"),
+    "unknown choice": (
+        put("channels/current/role", "inputt"),
+        "channels.current.role: unknown value 'inputt'; available: 'input', 'output'",
+    ),
+    "unknown estimation key": (
+        put("estimation", {"sover": "ipopt"}),
+        "estimation.sover: unknown key 'sover'; available",
+    ),
+    "no starts": (put("estimation", {"starts": 0}), "estimation.starts: this is 0; greater than or equal to 1"),
+    "other format": (
+        put("format", "friction-ocp-problem/9"),
+        "format: unknown value 'friction-ocp-problem/9'; available",
+    ),
+    "no training": (put("recordings/train", []), "recordings.train: "),
+    "torque constant of a current": (put("drive/motor", {}), "drive.motor.torque_constant: this key is missing"),
+    "missing stiffness": (
+        several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"ratio": 5}])),
+        "drive.transmissions[0].stiffness: this key is missing",
+    ),
+    "branch without ends": (
+        several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"stiffness": 1}, {"stiffness": 2}])),
+        "drive.transmissions[1].from: this key is missing; only a plain chain leaves it out",
+    ),
+    "nameless motor": (put("drive/motors", [{"torque_constant": 1}]), "drive.motors[0].name: this key is missing"),
+}
+
+MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "bounds the wrong way round": (
+        put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 1, "max": 0}),
+        "drive.shafts[0].friction.tau_c: min = 1 N m is above max = 0 N m; min below max; swap them",
+    ),
+    "guess outside": (
+        put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 0.06, "max": 1}),
+        "drive.shafts[0].friction.tau_c: guess = 0.05 N m is outside its bounds; 0.06 N m to 1 N m; move",
+    ),
+    "tau_s below tau_c": (
+        put(f"{FRICTION}/tau_s", 0.03),
+        "drive.shafts[0].friction: tau_s = 0.03 N m is below tau_c = 0.05 N m; breakaway must be >= Coulomb torque",
+    ),
+    "tau_s below tau_c in one direction": (
+        put(f"{FRICTION}/tau_s", {"positive": 0.06, "negative": {"guess": 0.01}}),
+        "drive.shafts[0].friction: tau_s.negative = 0.01 N m is below tau_c = 0.05 N m",
+    ),
+    "no inertia": (put(f"{SHAFT}/inertia", 0), "drive.shafts[0].inertia: inertia = 0 kg m^2; an inertia is positive"),
+    "no ratio": (
+        several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"ratio": 0, "stiffness": "rigid"}])),
+        "drive.transmissions[0].ratio: ratio = 0; must not be zero",
+    ),
+    "negative stiffness": (
+        several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"stiffness": -5}])),
+        "drive.transmissions[0].stiffness: stiffness = -5 N m/rad; must be positive",
+    ),
+    "play of a rigid joint": (
+        several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"stiffness": "rigid", "backlash": 0.1}])),
+        "drive.transmissions[0].backlash: backlash of a rigid transmission has no effect",
+    ),
+    "break count": (
+        put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [1, 2]}),
+        "drive.shafts[0].friction.breaks: there are 2 breaks for 2 slopes; 1 breaks: one fewer than slopes",
+    ),
+    "break order": (
+        put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2, 3], "breaks": [2, {"guess": 1}]}),
+        "drive.shafts[0].friction.breaks: the breaks are 2, 1; positive speeds that rise",
+    ),
+    "load without transmission": (
+        put(f"{FRICTION}/load", {"coulomb": 0.1}),
+        "drive.shafts[0].friction.load: friction of 'load' depends on load, and there is no transmission beside it",
+    ),
+    "load Stribeck without speed": (
+        put(FRICTION, {"law": "coulomb", "tau_c": 1, "load": {"stribeck": 0.1}}),
+        "drive.shafts[0].friction.load.stribeck: law 'coulomb' has no Stribeck speed",
+    ),
+    "unknown part": (
+        put("channels/position/measures", "laod.theta"),
+        "channels.position.measures: unknown part 'laod'; parts: load, motor, reference; or temperature; did you mean ",
+    ),
+    "unknown signal": (
+        put("channels/position/measures", "load.angle"),
+        "channels.position.measures: 'load' has no signal 'angle'; available: load.theta, load.omega, load.alpha",
+    ),
+    "reference as output": (
+        put("channels/goal", {"measures": "reference.theta", "role": "output"}),
+        "channels.goal.role: nothing predicts reference.theta; role: input",
+    ),
+    "acceleration as input": (
+        put("channels/current", {"measures": "load.alpha", "role": "input"}),
+        "channels.current.role: load.alpha cannot drive a shaft",
+    ),
+    "no output": (put("channels/position/role", "input"), "channels: no channel is an output"),
+    "nothing drives the motor": (drop("channels/current"), "drive.motor: nothing drives motor 'motor'"),
+    "driven twice": (
+        put("channels/torque", {"measures": "motor.torque", "role": "input"}),
+        "drive.motor: motor 'motor' is driven by motor.torque and by motor.current",
+    ),
+    "voltage without resistance": (
+        put("channels/current/measures", "motor.voltage"),
+        "drive.motor.resistance: motor 'motor' is driven by voltage, and its resistance is missing",
+    ),
+    "current of a motor driven by torque": (
+        put(
+            "channels",
+            {
+                "current": {"measures": "motor.torque", "role": "input"},
+                "position": {"measures": "motor.current"},
+            },
+        ),
+        "channels.position: motor.current cannot be predicted: motor 'motor' is driven by torque",
+    ),
+    "unknown feedback": (
+        put("controller", {**DUTY, "feedback": "positon"}),
+        "controller.feedback: unknown feedback channel 'positon'; available: current, position; did you mean",
+    ),
+    "no reference": (
+        put("controller", DUTY),
+        "controller: the duty controller has no set point; an input channel that",
+    ),
+    "no supply": (put("controller", DUTY), "controller: the duty of motor 'motor' has no supply voltage"),
+    "unknown shaft of a motor": (
+        put("drive/motor/shaft", "lod"),
+        "drive.motor.shaft: unknown shaft 'lod'; there are load; did you mean 'load'?",
+    ),
+    "unknown shaft of a transmission": (
+        put("drive/transmissions", [{"from": "load", "to": "arm", "stiffness": 1}]),
+        "drive.transmissions[0].to: unknown shaft 'arm'",
+    ),
+    "loose shaft": (put("drive/shafts", TWO_SHAFTS), "drive.shafts[1]: nothing joins shaft 'arm' to 'load'"),
+    "same name twice": (
+        several(put("drive/shafts", [SECOND_SHAFT, SECOND_SHAFT]), put("drive/transmissions", [{"stiffness": 1}])),
+        "drive.shafts: 2 shafts are called 'arm'",
+    ),
+    "unknown name in a tie": (
+        put(f"{FRICTION}/viscous", {"expr": "2 * load.inertai"}),
+        "drive.shafts[0].friction.viscous.expr: unknown name 'load.inertai' at position 5",
+    ),
+    "ties in a circle": (
+        several(
+            put(f"{SHAFT}/inertia", {"expr": "load.friction.tau_c"}), put(f"{FRICTION}/tau_c", {"expr": "load.inertia"})
+        ),
+        "the ties depend on each other in a circle: load.inertia -> load.friction.tau_c -> load.inertia",
+    ),
+    "constraint without relation": (
+        put("constraints", ["load.inertia"]),
+        "constraints[0]: 'load.inertia' is not an inequality; two values joined by <= or >=",
+    ),
+    "unknown set": (
+        put("recordings/train", [{"file": "sweep.h5", "set": {"motor.torque_const": 1}}]),
+        "recordings.train[0].set: unknown parameter 'motor.torque_const'; paths such as load.inertia; did you mean",
+    ),
+    "process noise on nothing": (
+        put("estimation", {"process_noise": {"lod": 0.1}}),
+        "estimation.process_noise.lod: unknown shaft 'lod'; there are load; did you mean 'load'?",
+    ),
+    "missing file": (
+        put("recordings/train", ["sweep.h5", "sweap.h5"]),
+        "recordings.train[1]: {folder}/sweap.h5: there is no such file",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", [*FILE_FAULTS, *MODEL_FAULTS])
+def test_fault_of_the_file_is_refused(workshop: Workshop, name: str) -> None:
+    """A fault of the file is refused when it is loaded, with one message at its place."""
+    spoil, expected = (FILE_FAULTS | MODEL_FAULTS)[name]
+    path = workshop.problem(spoil)
+    with pytest.raises(FrictionOcpError) as caught:
+        load_problem(path)
+    messages = [str(finding) for finding in caught.value.findings]
+    text = expected.replace("{folder}", str(workshop.folder))
+    assert len([message for message in messages if text in message]) == 1, "\n".join(messages)
+    assert all(message.startswith(f"{path}: ") for message in messages)
+
+
+def channel(name: str, change: Callable[[Any], Any], **attributes: str) -> Callable[[Any], None]:
+    """Return an edit of a recorded channel (or of the time)."""
+
+    def spoil(file: Any) -> None:
+        path = f"/channels/{name}" if name != "time" else "/time"
+        before, unit = file[path][()], file[path].attrs["unit"]
+        del file[path]
+        file[path] = change(before)
+        file[path].attrs.update({"unit": unit, **attributes})
+
+    return spoil
+
+
+def backwards(time: Any) -> Any:
+    return np.where(np.arange(time.size) == 100, time[98], time)
+
+
+RECORDING_FAULTS: dict[str, tuple[Callable[[Any], None], str]] = {
+    "unknown unit": (channel("position", lambda y: y, unit="furlong"), "channel 'position': unknown unit 'furlong'"),
+    "wrong unit": (
+        channel("position", lambda y: y, unit="A"),
+        "channel 'position' is in A, but load.theta is in rad; a unit that converts to rad",
+    ),
+    "no unit": (channel("position", lambda y: y, unit=""), "channel 'position' has no unit"),
+    "time backwards": (channel("time", backwards), "time is not increasing at sample 100 (0.1960 s after 0.1980 s)"),
+    "all NaN": (channel("position", lambda y: y * np.nan), "channel 'position' has no value: all 3000 samples are NaN"),
+    "clipped output": (
+        channel("position", lambda y: np.clip(y, 0.8 * y.min(), 0.8 * y.max())),
+        "channel 'position' is clipped: it stays at its extremes of ",
+    ),
+    "clipped input": (
+        channel("current", lambda y: np.clip(y, -0.3, 0.3)),
+        "channel 'current' is clipped: it stays at its extremes of -0.3 A or 0.3 A; record it with a wider range",
+    ),
+    "opposite sign": (
+        channel("current", lambda y: -y),
+        "channel 'current' and the motion of shaft 'load' have opposite signs; a positive torque accelerates",
+    ),
+    "still input": (
+        channel("current", lambda y: 0 * y + 0.2),
+        "channels.current: input 'current' never moves: it is 0.2 A throughout all training recordings",
+    ),
+    "missing channel": (
+        lambda file: file.move("/channels/position", "/channels/positon"),
+        "the recording has no channel 'position'; it has current, positon; did you mean 'positon'?",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RECORDING_FAULTS)
+def test_fault_of_a_recording_is_found(workshop: Workshop, name: str) -> None:
+    """A fault of a recording is found by loading or by checking, once, at the recording's place in the file."""
+    spoil, expected = RECORDING_FAULTS[name]
+    workshop.recording(spoil=spoil)
+    messages = workshop.messages(workshop.problem())
+    assert len([message for message in messages if expected in message]) == 1, "\n".join(messages)
+    place = "channels.current" if name == "still input" else f"recordings.train[0]: {workshop.folder}/sweep.h5"
+    assert f"problem.yaml: {place}: " in messages[0]
+
+
+def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:
+    """A recording that is no HDF5 file is refused at its place, with the command that makes one."""
+    (workshop.folder / "sweep.h5").write_text("time,current\n0,1\n")
+    (message,) = workshop.messages(workshop.problem())
+    assert "recordings.train[0]: " in message and "this is not an HDF5 file" in message and "import" in message
+
+
+def test_nothing_to_fit_is_an_error_of_the_check(workshop: Workshop) -> None:
+    """A problem of known numbers can be loaded and simulated, but the check says that there is nothing to fit."""
+    path = workshop.problem(several(put(f"{SHAFT}/inertia", 1), put(FRICTION, {"law": "coulomb", "tau_c": 1})))
+    assert load_problem(path)
+    assert any("nothing to fit" in message for message in workshop.messages(path))
+
+
+WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "no reversal": (put("channels/position/offset", 0.0), "'load' never reverses in training: Coulomb friction cannot"),
+    "break never reached": (
+        put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [{"guess": 900}]}),
+        "drive.shafts[0].friction.breaks[0]: break 900 rad/s is above the greatest speed in training",
+    ),
+    "gravity over a small angle": (
+        put(f"{SHAFT}/gravity", {"torque": {"guess": 1}, "phase": {"guess": 0}}),
+        "torque and phase of gravity cannot be told apart",
+    ),
+    "LuGre that gives energy back": (
+        put(FRICTION, {**LUGRE, "sigma1": 1, "sigma2": 0.4}),
+        "sigma2 = 0.4 is not above sigma1 (tau_s - tau_c)/tau_c = 0.5",
+    ),
+    "no motor": (
+        several(drop("drive/motor"), drop("channels/current")),
+        "there is no motor, and no input prescribes the motion of a shaft",
+    ),
+    "validated on the training data": (
+        put("recordings/validation", ["sweep.h5"]),
+        "this file also stands in recordings.tr",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WARNINGS)
+def test_doubtful_problem_is_a_warning(workshop: Workshop, name: str) -> None:
+    """What is doubtful is said, as a warning, and does not stop anyone."""
+    spoil, expected = WARNINGS[name]
+    if name == "no reversal":
+        workshop.recording(spoil=channel("position", lambda y: 3.0 * np.arange(y.size) * 0.002 + 0.1 * y))
+    if name == "gravity over a small angle":
+        workshop.recording(spoil=channel("position", lambda y: 0.1 * y / np.ptp(y)))
+    path = workshop.problem(spoil)
+    load_problem(path)
+    messages = [message for message in workshop.messages(path) if expected in message]
+    assert len(messages) == 1
+
+
+def test_all_findings_come_at_once(workshop: Workshop) -> None:
+    """Faults of keys, laws, numbers, bounds, files and data are all told in one run, and nothing is written."""
+    workshop.recording("clipped.h5", RECORDING_FAULTS["clipped output"][0])
+    workshop.recording("backwards.h5", RECORDING_FAULTS["time backwards"][0])
+    path = workshop.problem(
+        several(
+            put(f"{SHAFT}/colour", "red"),
+            put(
+                "drive/shafts",
+                [
+                    {"name": "load", "inertia": "heavy", "colour": "red", "friction": {"law": "lugree"}},
+                    {"name": "arm", "inertia": {"guess": 2, "min": 3, "max": 1}},
+                    {
+                        "name": "tip",
+                        "inertia": 1,
+                        "friction": {"law": "stribeck", "tau_c": 2, "tau_s": 1, "omega_s": 1},
+                    },
+                ],
+            ),
+            put("drive/transmissions", [{"stiffness": {"guess": 5, "min": 6}}, {"stiffness": "rigid"}]),
+            put("estimation", {"solver": "newton"}),
+            put("recordings/train", ["sweep.h5", "gone.h5", "clipped.h5", "backwards.h5"]),
+        )
+    )
+    before = sorted(workshop.folder.iterdir())
+    expected = [
+        "drive.shafts[0].colour: unknown key",
+        "drive.shafts[0].inertia: this is 'heavy'",
+        "drive.shafts[0].friction.law: unknown friction law 'lugree'",
+        "drive.shafts[1].inertia: min = 3 kg m^2 is above max = 1 kg m^2",
+        "drive.shafts[2].friction: tau_s = 1 N m is below tau_c = 2 N m",
+        "drive.transmissions[0].stiffness: guess = 5 N m/rad is outside",
+        "estimation.solver: unknown value 'newton'",
+        "recordings.train[1]: ",
+        "recordings.train[2]: ",
+        "recordings.train[3]: ",
+    ]
+    messages = workshop.messages(path)
+    assert len(messages) == len(expected), "\n".join(messages)
+    for text in expected:
+        assert len([message for message in messages if f"{path}: {text}" in message]) == 1, text
+    assert sorted(workshop.folder.iterdir()) == before
+
+
+TEXTS = {
+    "tab": ("a:\n\t- 1\n", "this is not YAML: line 2, column 1"),
+    "twice": ("title: a\nchannels: {x: 1, x: 2}\ntitle: b\n", "line 3: key 'title' stands here again, first in line 1"),
+    "python": ("format: !!python/name:os.system\n", "this is not YAML: line 1"),
+    "list": ("- 1\n", "this is not a problem file"),
+    "bomb": (
+        "a: &a [x,x,x,x,x,x,x,x,x]\n"
+        + "".join(f"{chr(98 + k)}: &{chr(98 + k)} [{','.join(['*' + chr(97 + k)] * 9)}]\n" for k in range(8)),
+        "its aliases stand for ",
+    ),
+    "self": ("a: &a [*a]\n", "an alias contains itself"),
+    "deep": ("a: " + "[" * 3000, "this is nested too deeply"),
+    "latin": ("a: \xe9\n".encode("latin-1"), "the file cannot be read as text"),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text_that_is_no_problem_is_refused(tmp_path: Path, name: str) -> None:
+    """YAML that is broken, repeats keys, runs code or explodes is refused with its line."""
+    text, expected = TEXTS[name]
+    path = tmp_path / "problem.yaml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(FrictionOcpError, match=re.escape(expected)):
+        load_problem(path)
+
+
+def test_missing_problem_file_is_refused(tmp_path: Path) -> None:
+    """A path without a file is said to be one."""
+    with pytest.raises(FrictionOcpError, match=r"there is no such file; correct the path"):
+        load_problem(tmp_path / "none.yaml")
