@@ -110,7 +110,9 @@ class Dae:
         rank, count = ca.sprank(slope), len(self.algebraic)
         if self.alg.numel() != count or rank < count:
             what = f"{count} algebraic variables, but equations for {min(rank, self.alg.numel())} of them"
-            raise FrictionOcpError(Finding(f"algebraic variables {names}", what, "as many equations as variables", remedy))
+            raise FrictionOcpError(
+                Finding(f"algebraic variables {names}", what, "as many equations as variables", remedy)
+            )
         matrix = self._at(values, slope)
         scaled = matrix / np.maximum(np.abs(matrix).max(axis=1, keepdims=True), np.finfo(float).tiny)
         _, sizes, directions = np.linalg.svd(scaled)

@@ -29,7 +29,7 @@ def saturate(controller: Controller, command: Any) -> Any:
     if controller.saturation is None:
         return command
     low, high = controller.saturation
-    return ca.fmin(ca.fmax(command, low), high)
+    return ca.fmin(ca.fmax(ca.SX(command), ca.SX(low)), ca.SX(high))
 
 
 def command(controller: Controller, seen: ControlSignals, integral: Any) -> Any:

@@ -16,7 +16,7 @@ from friction_ocp.drive.kick import through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import group_angles, group_speeds, recorded
-from friction_ocp.drive.units import feedback_motion, signal_unit, unit_of
+from friction_ocp.drive.units import command_unit, signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import si_unit
@@ -44,7 +44,8 @@ class _Symbols:
 
 
 def dae(drive: Drive, width: float) -> Dae:
-    """Return the drive in continuous time, the sign of its friction smoothed over the speed `width` > 0 of each shaft.
+    """Return the drive in continuous time; static friction is multiplied by the sign of its shaft's speed, which is
+    smoothed over `width` > 0 in the unit of that speed, and backlash is rounded over that share of the free play.
 
     The torque through a rigid joint is an algebraic variable where friction depends on it. The command of a sampled
     controller becomes the input `controller.held`. Raises FrictionOcpError for a width that is not positive.
@@ -80,10 +81,10 @@ def dae(drive: Drive, width: float) -> Dae:
 def _symbols(mech: Mechanism) -> _Symbols:
     counts = (mech.angle_groups, mech.free_groups, mech.bristles, mech.extra_names)
     names = iter(mech.state_names)
-    parts = [column([symbol(next(names)) for _ in part]) for part in counts]
+    angles, speeds, bristle, extra = (column([symbol(next(names)) for _ in part]) for part in counts)
     memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
     joints = column([symbol(f"{joint.name}.torque") for joint in mech.loaded_joints()])
-    return _Symbols(*parts, memory, joints)
+    return _Symbols(angles, speeds, bristle, extra, memory, joints)
 
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
@@ -123,17 +124,10 @@ def _states(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
 
 
 def _state_unit(drive: Drive, name: str) -> str:
-    if name == "controller.integral":
-        return _command_unit(drive)
+    if drive.controller is not None and name.startswith("controller."):
+        return command_unit(drive, drive.controller)
     part, _, signal = name.partition(".")
     return si_unit("angle", drive.shaft(part).motion) if signal == "friction.z" else signal_unit(drive, name)
-
-
-def _command_unit(drive: Drive) -> str:
-    controller = drive.controller
-    assert controller is not None
-    driven = drive.shaft(drive.motors[0].shaft) if drive.motors else drive.shafts[0]
-    return "1" if controller.type == "duty" else si_unit(controller.output, driven.motion)
 
 
 def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
@@ -145,11 +139,13 @@ def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
 def _inputs(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
     measures = {channel.name: channel.measures for channel in mech.drive.inputs}
     given = [
-        Variable(name, signal_unit(mech.drive, measures[name.rstrip("'")]) + ("/s" if name.endswith("'") else ""), item)
+        Variable(
+            name, signal_unit(mech.drive, measures[name.removesuffix("'")]) + ("/s" if name.endswith("'") else ""), item
+        )
         for name, item in mech.inputs.items()
     ]
     held = [item for item in ca.vertsplit(symbols.memory) if item.is_symbolic()]
-    return (*given, *(Variable(HELD, _command_unit(mech.drive), item) for item in held))
+    return (*given, *(Variable(HELD, _state_unit(mech.drive, HELD), item) for item in held))
 
 
 def _parameters(drive: Drive, mech: Mechanism) -> tuple[Variable, ...]:

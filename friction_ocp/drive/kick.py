@@ -138,11 +138,12 @@ def _solve(
         pushed = _group_sum(mech, group, torques) - own[group] * step.at.v[group] - whole.offset
         gain = step.h / mech.inertia(group)
         free = before + gain * (pushed - 0.5 * damping * before)
-        divisor = ca.fmax(1.0 + 0.5 * gain * damping, 0.5)
+        divisor = ca.fmax(ca.SX(1.0 + 0.5 * gain * damping), 0.5)
         moved = soft_threshold(free, gain * whole.upper, gain * whole.lower, step.width[group]) / divisor
         speeds[group], means[group] = moved, 0.5 * (before + moved)
         if not ca.SX(whole.upper + whole.lower).is_zero():
-            resting = _combined(mech, {name: _response(mech, step, mech.drive.shaft(name), load, 0.0) for name in members})
+            at_rest = {name: _response(mech, step, mech.drive.shaft(name), load, 0.0) for name in members}
+            resting = _combined(mech, at_rest)
             slid = (free - gain * where(before >= 0, whole.upper, -whole.lower)) / divisor
             speeds[group], means[group] = _through_rest(step, group, gain * pushed, gain, resting, slid, moved)
         set_valued = (free - speeds[group] * divisor) / gain

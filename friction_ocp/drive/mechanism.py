@@ -15,6 +15,7 @@ from friction_ocp.drive.control import ControlSignals, command, has_integral, in
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.friction.smoothing import soft_threshold, where
 
 
@@ -106,6 +107,9 @@ class Mechanism:
         drive = self.drive
         onward = [item for item in drive.transmissions if item.from_shaft == shaft.name]
         backward = [item for item in drive.transmissions if item.to_shaft == shaft.name]
+        if not onward + backward:
+            what = "friction depends on the transmitted torque, but no transmission ends here"
+            raise FrictionOcpError(Finding(f"{shaft.name}.friction.load", what, remedy="leave the load dependence out"))
         return (onward + backward)[0]
 
     def shaft_angle(self, name: str, motion: Motion) -> Any:
@@ -137,9 +141,7 @@ class Mechanism:
         damper acts while the flanks touch.
         """
         twist = self.shaft_angle(item.from_shaft, motion) / item.ratio - self.shaft_angle(item.to_shaft, motion)
-        rate = (
-            self.shaft_speed(item.from_shaft, motion.v) / item.ratio - self.shaft_speed(item.to_shaft, motion.v)
-        )
+        rate = self.shaft_speed(item.from_shaft, motion.v) / item.ratio - self.shaft_speed(item.to_shaft, motion.v)
         if not isinstance(item.backlash, ca.SX) and item.backlash == 0.0:
             return item.stiffness * twist + item.damping * rate
         half = 0.5 * item.backlash
@@ -157,7 +159,7 @@ class Mechanism:
             torque: Any = ca.SX(0.0)
             if shaft.gravity is not None:
                 angle = self.shaft_angle(shaft.name, motion) + shaft.gravity.phase
-                torque = torque - shaft.gravity.torque * ca.sin(angle)
+                torque = torque - shaft.gravity.torque * ca.sin(ca.SX(angle))
             if shaft.external_torque is not None:
                 torque = torque + shaft.external_torque.constant
             torques[shaft.name] = torque
@@ -238,8 +240,8 @@ class Mechanism:
         channel = next(item for item in self.drive.channels if item.name == controller.feedback)
         theta = self.shaft_angle(channel.part, motion) * channel.gain + channel.offset
         omega = self.shaft_speed(channel.part, motion.v) * channel.gain
-        inputs = [self.true_input(f"reference.{signal}") for signal in ("theta", "omega")]
-        wanted = [0.0 if item is None else item for item in inputs]
+        angle, speed = self.true_input("reference.theta"), self.true_input("reference.omega")
+        wanted = (0.0 if angle is None else angle, 0.0 if speed is None else speed)
         if channel.signal == "omega":
             return ControlSignals(*wanted, 0.0, omega + channel.offset, measures_speed=True)
         return ControlSignals(*wanted, theta, omega)
@@ -294,7 +296,4 @@ def _needs_slope(channel: Channel, structure: Topology) -> bool:
 
 def _is_live(drive: Drive, path: str) -> bool:
     """Zero backlash stays a plain number, so that a transmission without play has no dead zone at all."""
-    for item in drive.transmissions:
-        if path == f"{item.name}.backlash" and item.backlash == 0.0:
-            return False
-    return True
+    return path not in [f"{item.name}.backlash" for item in drive.transmissions if item.backlash == 0.0]

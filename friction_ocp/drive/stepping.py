@@ -18,7 +18,7 @@ from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, s
 from friction_ocp.drive.parts import Channel, Drive
 
 INSTANT = 1e-2
-"""Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt where the speed is nearly 0."""
+"""Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class _Expression:
 
 
 def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
-    q0, v0 = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
+    v0 = group_speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * _pick(v0, mech.angle_groups)
     mean = v0
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}

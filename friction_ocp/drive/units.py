@@ -79,7 +79,7 @@ def _ratio_unit(drive: Drive, transmission: str) -> str:
 def _gain_unit(drive: Drive, key: str) -> str:
     controller = drive.controller
     assert controller is not None
-    output = _output_unit(drive, controller)
+    output = command_unit(drive, controller)
     if key.startswith("saturation"):
         return output
     if controller.type == "cascade" and key == "kp":
@@ -91,7 +91,8 @@ def _gain_unit(drive: Drive, key: str) -> str:
     return f"s/{angle}" if output == "1" else f"{output} s/{angle}"
 
 
-def _output_unit(drive: Drive, controller: Controller) -> str:
+def command_unit(drive: Drive, controller: Controller) -> str:
+    """Return the SI unit of a controller's command."""
     if controller.type == "duty":
         return "1"
     driven = drive.shaft(drive.motors[0].shaft) if drive.motors else drive.shafts[0]

@@ -26,29 +26,26 @@ OPTIONS: dict[str, Any] = {
     "no_nlp_grad": True,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
+    "ipopt.tol": 1e-10,
+    "ipopt.acceptable_iter": 0,
     "ipopt.nlp_scaling_method": "none",
     "ipopt.mu_strategy": "adaptive",
     "ipopt.bound_relax_factor": 0.0,
     "ipopt.bound_push": 1e-4,
     "ipopt.bound_frac": 1e-4,
-    "ipopt.acceptable_tol": 1e10,
-    "ipopt.acceptable_dual_inf_tol": 1e10,
-    "ipopt.acceptable_compl_inf_tol": 1e-7,
-    "ipopt.acceptable_iter": 3,
 }
-"""Objective and variables are scaled here. A point is acceptable when three steps in a row gained next to nothing,
-the criterion of `solve_gauss_newton`."""
+"""Objective and variables are scaled here, and here it is decided when to stop (`_Evaluations.report`)."""
 
-CONVERGED = {
-    "Solve_Succeeded": "the optimality conditions hold",
-    "Solved_To_Acceptable_Level": "three steps in a row gained next to nothing",
-}
+ON_BOUND = 1e-7
+"""Ipopt stays inside the bounds; what is closer, in typical sizes of the parameter, is on the bound."""
+
+SETTLED = "the predicted decrease is below the tolerance"
+SLOW = "three steps in a row gained next to nothing"
 FAILED = {
     "Infeasible_Problem_Detected": "no values within the bounds meet the constraints; widen the bounds or drop one",
     "Diverging_Iterates": "the iterates diverge; give bounds to the parameters",
     "Invalid_Number_Detected": "the simulation breaks down; start from other guesses or narrow the bounds",
 }
-STUCK = ("Search_Direction_Becomes_Too_Small", "Restoration_Failed", "Error_In_Step_Computation")
 
 
 def solve_ipopt(
@@ -63,34 +60,38 @@ def solve_ipopt(
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
     layout = NlpLayout.of(program, point)
-    evaluations = _Evaluations(program, layout, point, watch)
+    evaluations = _Evaluations(program, layout, point, tolerances, watch)
     with _deferred_interrupt(evaluations):
-        status, iterations, x = _run(program.space, layout, evaluations, tolerances)
+        status, iterations, x = _run(program.space, layout, evaluations)
     if evaluations.stop is not None:
         raise evaluations.stop
     end = layout.point(x, point)
-    end = Point(program.space.clip(end.theta), end.nodes)
-    return _solution(program, end, status, iterations, tolerances)
+    end = Point(_on_bounds(program.space, end.theta), end.nodes)
+    return _solution(program, end, evaluations.settled or status, iterations, tolerances)
+
+
+def _on_bounds(space: ParameterSpace, theta: FloatArray) -> FloatArray:
+    near = ON_BOUND * space.scale
+    theta = np.where(theta - space.lower < near, space.lower, theta)
+    return np.where(space.upper - theta < near, space.upper, theta)
 
 
 def _solution(program: Program, end: Point, status: str, iterations: int, tolerances: Tolerances) -> Solution:
     system = program.linearise(end)
     step, predicted = trial_step(program.space, end, system, 1e-6)
     relative = predicted / max(system.objective, 1e-300)
-    if status in CONVERGED:
-        return Solution(end, system.objective, iterations, True, CONVERGED[status])
-    if status in STUCK and relative <= tolerances.stalled:
-        return Solution(end, system.objective, iterations, True, "no step decreases the objective further")
+    if relative <= tolerances.stalled and status != "Maximum_Iterations_Exceeded":
+        text = status if status in (SETTLED, SLOW) else "no step decreases the objective further"
+        return Solution(end, system.objective, iterations, True, text)
     if status == "Maximum_Iterations_Exceeded":
         worst = int(np.argmax(np.abs(step.theta - end.theta) / program.space.scale))
         text = (
-            f"iteration limit reached; {program.space.names[worst]} still wants to move from {end.theta[worst]:.3g} to "
-            f"{step.theta[worst]:.3g}; raise max_iterations or start from better guesses"
+            f"iteration limit reached; {program.space.names[worst]} would move from {end.theta[worst]:.3g} to "
+            f"{step.theta[worst]:.3g} next; raise max_iterations or start from better guesses"
         )
-    elif status in STUCK:
-        text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
     else:
-        text = FAILED.get(status, f"Ipopt stopped with {status}")
+        text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
+        text = FAILED.get(status, f"{text} (Ipopt: {status})")
     return Solution(end, system.objective, iterations, False, text)
 
 
@@ -184,13 +185,17 @@ class _Evaluations:
     An exception must not cross Ipopt: it is kept in `stop`, and Ipopt is told at the end of its iteration.
     """
 
-    def __init__(self, program: Program, layout: NlpLayout, start: Point, watch: Watch | None) -> None:
-        self.program, self.layout, self.start, self.watch = program, layout, start, watch
+    def __init__(
+        self, program: Program, layout: NlpLayout, start: Point, tolerances: Tolerances, watch: Watch | None
+    ) -> None:
+        self.program, self.layout, self.start = program, layout, start
+        self.tolerances, self.watch = tolerances, watch
         self.stop: BaseException | None = None
+        self.settled = ""
         self._system = program.linearise(start)
         self._at = b""
         self.factor = 1.0 / max(self._system.objective, 1e-300)
-        self._iteration = 0
+        self._history: list[float] = []
 
     def objective(self, x: FloatArray) -> float:
         """Return the scaled objective; not a number where the simulation breaks down."""
@@ -215,13 +220,28 @@ class _Evaluations:
 
     def report(self, x: FloatArray) -> bool:
         """Tell `watch` of an iterate; return whether Ipopt must stop."""
-        try:
-            if self._iteration and self.watch is not None and self.stop is None:
-                self.watch(self._iteration, self._linearised(x).objective, self.layout.point(x, self.start))
-        except BaseException as error:
-            self.stop = self.stop or error
-        self._iteration += 1
-        return self.stop is not None
+        system, point = self._linearised(x), self.layout.point(x, self.start)
+        if self.stop is None:
+            try:
+                self._history.append(system.objective)
+                self.settled = self._judged(point, system)
+                if self.watch is not None and len(self._history) > 1:
+                    self.watch(len(self._history) - 1, system.objective, point)
+            except BaseException as error:
+                self.stop = error
+        return bool(self.settled) or self.stop is not None
+
+    def _judged(self, point: Point, system: Linearisation) -> str:
+        """Return why an iterate is the answer, by the criteria of `solve_gauss_newton`; empty where it is not."""
+        _, predicted = trial_step(self.program.space, point, system, 1e-6)
+        margins = constraint_rows(self.program.space, point.theta)[0]
+        if np.any(margins < -1e-8):
+            return ""
+        if predicted <= self.tolerances.decrease * system.objective:
+            return SETTLED
+        latest = np.array(self._history[-4:])
+        slow = latest.size == 4 and bool(np.all(np.abs(np.diff(latest)) <= self.tolerances.progress * latest[-1]))
+        return SLOW if slow and predicted <= self.tolerances.stalled * system.objective else ""
 
     def _linearised(self, x: FloatArray) -> Linearisation:
         key = x.tobytes()
@@ -299,15 +319,11 @@ def _column(argument: ca.DM) -> FloatArray:
     return np.asarray(argument).ravel()
 
 
-def _run(
-    space: ParameterSpace, layout: NlpLayout, evaluations: _Evaluations, tolerances: Tolerances
-) -> tuple[str, int, FloatArray]:
+def _run(space: ParameterSpace, layout: NlpLayout, evaluations: _Evaluations) -> tuple[str, int, FloatArray]:
     """Return Ipopt's status, its number of iterations and its last iterate in scaled variables."""
     functions = _functions(layout, evaluations)
     options = OPTIONS | {
-        "ipopt.max_iter": tolerances.max_iterations,
-        "ipopt.tol": tolerances.decrease,
-        "ipopt.acceptable_obj_change_tol": tolerances.progress,
+        "ipopt.max_iter": evaluations.tolerances.max_iterations,
         **{key: functions[key] for key in ("grad_f", "jac_g", "hess_lag", "iteration_callback")},
     }
     solver = ca.nlpsol("identify", "ipopt", functions["nlp"], options)
@@ -351,8 +367,6 @@ def _functions(layout: NlpLayout, evaluations: _Evaluations) -> dict[str, _Callb
         "nlp": _Callback("nlp", at, {"f": scalar, "g": g}, values),
         "grad_f": _Callback("nlp_grad_f", at, {"f": scalar, "grad_f_x": x}, gradient),
         "jac_g": _Callback("nlp_jac_g", at, {"g": g, "jac_g_x": jacobian}, slopes),
-        "hess_lag": _Callback(
-            "nlp_hess_l", at | {"lam_f": scalar, "lam_g": g}, {"hess": layout.hessian}, hessian
-        ),
+        "hess_lag": _Callback("nlp_hess_l", at | {"lam_f": scalar, "lam_g": g}, {"hess": layout.hessian}, hessian),
         "iteration_callback": _Callback("report", results, {"stop": scalar}, report),
     }

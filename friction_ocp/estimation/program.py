@@ -31,12 +31,18 @@ class Segments:
     measured: int = 0
     """How many nodes, from the first, are no variables but what the smoothed measurement says."""
     start_weight: FloatArray | None = None
-    """(states,) 1 / standard deviation of the prior on the first node, where that is a variable."""
+    """(segments, states) 1 / standard deviation of the prior on each node, about what the smoothed measurement says."""
 
     @property
     def count(self) -> int:
         """Number of segments."""
         return len(self.first) - 1
+
+    @property
+    def tied(self) -> IntArray:
+        """Indices of the nodes that have a prior."""
+        assert self.start_weight is not None
+        return np.flatnonzero(np.any(self.start_weight > 0, axis=1))
 
 
 @dataclass(frozen=True)
@@ -139,11 +145,12 @@ class Program:
         return 0.5 * float(np.sum(scaled**2))
 
     def _start_cost(self, index: int, point: Point) -> float:
-        weight = self.segments[index].start_weight
-        if weight is None:
+        cut = self.segments[index]
+        if cut.start_weight is None:
             return 0.0
-        suggested, _ = self.measured_states(self.experiments[index], point.theta, self.segments[index].first[:1])
-        return 0.5 * float(np.sum((weight * (point.nodes[index][0] - suggested[0])) ** 2))
+        tied = cut.tied
+        suggested, _ = self.measured_states(self.experiments[index], point.theta, cut.first[tied])
+        return 0.5 * float(np.sum((cut.start_weight[tied] * (point.nodes[index][tied] - suggested)) ** 2))
 
     def linearise(self, point: Point) -> Linearisation:
         """Return objective, gradient and Gauss-Newton Hessian at a point."""
@@ -219,11 +226,12 @@ class Program:
             for j, slope in enumerate(slopes):
                 system.fold_node(j, slope)
         elif cut.start_weight is not None:
-            suggested, slopes = self.measured_states(item, point.theta, cut.first[:1])
-            weight = np.diag(cut.start_weight)
-            error = cut.start_weight * (point.nodes[index][0] - suggested[0])
-            system.cost += 0.5 * float(error @ error)
-            system.add(0, weight, -weight @ slopes[0], error, np.ones(error.size))
+            suggested, slopes = self.measured_states(item, point.theta, cut.first[cut.tied])
+            for j, expected, slope in zip(cut.tied, suggested, slopes, strict=True):
+                weight = np.diag(cut.start_weight[j])
+                error = cut.start_weight[j] * (point.nodes[index][j] - expected)
+                system.cost += 0.5 * float(error @ error)
+                system.add(int(j), weight, -weight @ slope, error, np.ones(error.size))
 
 
 @dataclass

@@ -17,7 +17,7 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 PREDICTION_SAMPLES = 20
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01)
 """Rounding of the absolute loss over the mean error, stage by stage."""
-WIDTHS = (0.1, 0.02, 0.0)
+WIDTHS = (0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact."""
 
 
@@ -88,10 +88,19 @@ def windows(item: Experiment, horizon: float | None) -> IntArray:
 
 
 def _with_start(model: Model, cut: Segments) -> Segments:
-    """Tie the first state to the measurement: exactly, or with a prior of its typical size."""
+    """Tie the first state to the measurement: exactly, or with a prior of its typical size.
+
+    A bristle's deflection is tied so at the start of every window: what it was before is soon forgotten, and nothing
+    else would keep it in reach.
+    """
     if model.problem.estimation.initial_state == "measured":
         return replace(cut, measured=1)
-    return replace(cut, start_weight=1.0 / model.state_scale)
+    weight = np.zeros((cut.count, model.state_scale.size))
+    weight[0] = 1.0 / model.state_scale
+    if cut.gap_weight is None:
+        bristles = [name.endswith(".friction.z") for name in model.drive.state_names]
+        weight[:, bristles] = weight[0, bristles]
+    return replace(cut, start_weight=weight)
 
 
 def mean_error(program: Program, point: Point) -> float:

@@ -126,7 +126,8 @@ class FrictionElement:
     def _static_response(self, omega: ca.SX, transmitted: Any) -> StepResponse:
         levels: list[Any] = []
         slopes: list[Any] = []
-        for side, sign in (("positive", 1.0), ("negative", -1.0)):
+        sides: tuple[tuple[Direction, float], ...] = (("positive", 1.0), ("negative", -1.0))
+        for side, sign in sides:
             speed = ca.SX.sym("speed")  # pyright: ignore[reportArgumentType]
             level = ca.SX(self.magnitude(side, speed, transmitted))
             slope = ca.jacobian(level, speed)

@@ -17,7 +17,7 @@ TINY = 1e-300
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """Choose elementwise; SX conditions become `if_else`."""
     if isinstance(condition, ca.SX):
-        return ca.if_else(condition, yes, no)
+        return ca.if_else(condition, ca.SX(yes), ca.SX(no))
     return np.where(condition, yes, no)
 
 

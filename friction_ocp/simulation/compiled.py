@@ -73,7 +73,9 @@ def compiler() -> str | None:
     chosen = os.environ.get("CC", "")
     if chosen == "none":
         return None
-    return next((path for path in (shutil.which(name) for name in (chosen, "cc", "gcc", "clang") if name) if path), None)
+    return next(
+        (path for path in (shutil.which(name) for name in (chosen, "cc", "gcc", "clang") if name) if path), None
+    )
 
 
 def cache_folder() -> Path:

@@ -1,3 +1,6 @@
 """CasADi's virtual machine."""
-class InterpretedKernel: 
-    def __init__(self, drive, active): raise RuntimeError
+
+
+class InterpretedKernel:
+    def __init__(self, drive, active):
+        raise RuntimeError

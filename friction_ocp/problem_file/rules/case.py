@@ -198,7 +198,8 @@ class Case:
         gain, offset = (self.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
         if recorded is None or not _is_usable(recorded) or not abs(gain) > 0:
             return None
-        value, slope, _ = smooth_motion(recorded.time, (recorded.values - offset) / gain)
+        with np.errstate(all="ignore"):  # absurd values come out as not finite
+            value, slope, _ = smooth_motion(recorded.time, (recorded.values - offset) / gain)
         if not np.all(np.isfinite(slope)):
             return None
         return Motion(recorded.time, value, slope) if channel.signal == "theta" else Motion(recorded.time, None, value)

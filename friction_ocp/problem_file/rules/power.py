@@ -22,6 +22,11 @@ def contradicts(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Seq
     The work is fitted by what a body takes up: kinetic energy, Coulomb and viscous losses, all with factors >= 0, and
     the potential energy of the shafts whose motion is in `heavy`, with any factor.
     """
+    with np.errstate(all="ignore"):  # absurd values come out as not finite
+        return _contradicts(motion, time, effort, heavy)
+
+
+def _contradicts(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Sequence[Motion]) -> bool:
     present = np.isfinite(effort)
     if np.count_nonzero(present) < 5:
         return False
@@ -52,5 +57,8 @@ def _misfit(columns: FloatArray, work: FloatArray) -> float:
     used = columns[:, scales > 0] / scales[scales > 0]
     if size == 0.0 or not np.isfinite(size) or not used.size or not np.all(np.isfinite(used)):
         return 1.0
-    _, residual = optimize.nnls(used, work / size)
+    try:
+        _, residual = optimize.nnls(used, work / size)
+    except RuntimeError:  # no convergence
+        return 1.0
     return float(residual)
