@@ -77,7 +77,7 @@ def test_arithmetic_agrees_with_python(text: str) -> None:
 ERRORS = {
     "load.inertai * 2": "unknown name 'load.inertai' at position 1 of 'load.inertai * 2'; paths of parameters and abs, "
     "sqrt, exp, log, min, max; did you mean 'load.inertia'",
-    "1 + motor-load.stifness": "unknown name 'motor-load.stifness' at position 5",
+    "1 + motor-load.stifness": "did you mean 'motor-load.stiffness'",
     "2 *": "the expression ends at position 4",
     "2 3": "unexpected '3' at position 3",
     "(2": "a closing parenthesis is missing at position 3",

@@ -12,10 +12,11 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.dae import Dae, Variable
+from friction_ocp.drive.coordinates import group_angles, group_speeds
 from friction_ocp.drive.kick import through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Drive
-from friction_ocp.drive.stepping import group_angles, group_speeds, recorded
+from friction_ocp.drive.stepping import recorded
 from friction_ocp.drive.units import command_unit, signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError

@@ -13,9 +13,11 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import apply_tick, compute_tick
+from friction_ocp.drive.coordinates import group_angles, group_speeds, pick
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.drive.start import start_state
 
 INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
@@ -81,33 +83,6 @@ def _state(mech: Mechanism) -> _State:
     return _State(ca.vertcat(*parts), *parts)
 
 
-def group_angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
-    """Return the angles of all groups from those that are states; the others are inputs."""
-    where_is = {g: k for k, g in enumerate(mech.angle_groups)}
-    groups = range(len(mech.topology.roots))
-    return column([angles[where_is[g]] if g in where_is else _prescribed(mech, g, "theta") for g in groups])
-
-
-def group_speeds(mech: Mechanism, speeds: ca.SX) -> ca.SX:
-    """Return the speeds of all groups from those that are states; the others are inputs."""
-    where_is = {g: k for k, g in enumerate(mech.free_groups)}
-    groups = range(len(mech.topology.roots))
-    return column([speeds[where_is[g]] if g in where_is else _prescribed(mech, g, "omega") for g in groups])
-
-
-def _prescribed(mech: Mechanism, group: int, signal: str) -> Any:
-    """Return the angle or speed of a driven group, in terms of its first shaft."""
-    channel = next(
-        item
-        for item in mech.drive.inputs
-        if item.signal == mech.prescribed[group] and mech.topology.group_of.get(item.part) == group
-    )
-    ratio = mech.topology.speed_ratio[channel.part]
-    if signal == "omega" and channel.signal == "theta":
-        return mech.inputs[f"{channel.name}'"] / channel.gain / ratio
-    return (mech.inputs[channel.name] - channel.offset) / channel.gain / ratio
-
-
 def _passes(mech: Mechanism) -> int:
     """One pass suffices where nothing but the own speed couples into the speed update."""
     coupled = bool(mech.topology.elastic) or bool(mech.bristles) or bool(mech.extra_names)
@@ -141,7 +116,7 @@ class _Expression:
 
 def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     v0 = group_speeds(mech, state.speeds)
-    free_angles = state.angles + 0.5 * h * _pick(v0, mech.angle_groups)
+    free_angles = state.angles + 0.5 * h * pick(v0, mech.angle_groups)
     mean = v0
     bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
     extra, v1, load = state.extra, v0, dict[str, Any]()
@@ -149,7 +124,7 @@ def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Express
     for _ in range(_passes(mech)):
         # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
         # to fourth order in its frequencies (Takahashi & Imada 1984)
-        middle = group_angles(mech, free_angles + h / 12.0 * _pick(v1 - v0, mech.angle_groups))
+        middle = group_angles(mech, free_angles + h / 12.0 * pick(v1 - v0, mech.angle_groups))
         at = Motion(middle, mean, extra, state.memory)
         done = implicit_kick(mech, Step(h, v0, at, bristle, width))
         v1, load = done.v, done.load
@@ -157,14 +132,10 @@ def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Express
         mean = done.mean
         extra = 0.5 * (state.extra + _advance_extra(mech, state, Motion(middle, mean, state.extra, state.memory), h))
     after = 2.0 * extra - state.extra
-    angles = state.angles + h * _pick(mean, mech.angle_groups)
+    angles = state.angles + h * pick(mean, mech.angle_groups)
     deflections = _advance_bristles(mech, state, mean, h, load)
-    value = ca.vertcat(angles, _pick(v1, mech.free_groups), deflections, after, state.memory)
+    value = ca.vertcat(angles, pick(v1, mech.free_groups), deflections, after, state.memory)
     return _Expression(value, tuple(unknowns))
-
-
-def _pick(vector: ca.SX, groups: tuple[int, ...]) -> ca.SX:
-    return column([vector[g] for g in groups])
 
 
 def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.SX:
@@ -227,61 +198,6 @@ def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
     return ca.vertcat(state.angles, state.speeds, state.bristle, state.extra, column(chosen))
 
 
-def _start(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
-    """Return the state that measured motion suggests: no twist, bristles as deflected by steady motion."""
-    q, v = _measured_motion(mech, y, dy)
-    at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    deflections = [shaft.friction.steady_deflection(mech.shaft_speed(shaft.name, v)) for shaft in mech.bristles]
-    memory = [_first_memory(mech, at, name) for name in mech.memory_names]
-    return ca.vertcat(
-        _pick(q, mech.angle_groups), _pick(v, mech.free_groups), column(deflections), at.extra, column(memory)
-    )
-
-
-def _first_memory(mech: Mechanism, at: Motion, name: str) -> Any:
-    if not name.startswith("controller.previous"):
-        return 0.0
-    controller, seen = mech.drive.controller, mech.seen(at)
-    assert controller is not None and controller.sample_time is not None
-    return seen.theta - (1.0 if name.endswith("1") else 2.0) * controller.sample_time * seen.omega
-
-
-def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return group angles and speeds from the channels that see them, else through the transmissions."""
-    q, v = dict[int, Any](), dict[int, Any]()
-    for k, channel in enumerate(mech.drive.outputs):
-        group = mech.topology.group_of.get(channel.part)
-        if group is None or channel.signal == "alpha":
-            continue
-        ratio = mech.topology.speed_ratio[channel.part] * channel.gain
-        if channel.signal == "theta":
-            q.setdefault(group, (y[k] - channel.offset) / ratio)
-            v[group] = dy[k] / ratio
-        else:
-            v.setdefault(group, (y[k] - channel.offset) / ratio)
-    for group in mech.prescribed:
-        v[group] = _prescribed(mech, group, "omega")
-        if mech.prescribed[group] == "theta":
-            q[group] = _prescribed(mech, group, "theta")
-    for known in (q, v):
-        _spread(mech, known)
-    groups = range(len(mech.topology.roots))
-    return column([q.get(g, 0.0) for g in groups]), column([v.get(g, 0.0) for g in groups])
-
-
-def _spread(mech: Mechanism, known: dict[int, Any]) -> None:
-    """Carry angles or speeds over elastic transmissions to groups that no channel sees."""
-    ratio, group_of = mech.topology.speed_ratio, mech.topology.group_of
-    for _ in mech.topology.elastic:
-        for item in mech.topology.elastic:
-            a, b = group_of[item.from_shaft], group_of[item.to_shaft]
-            whole = item.ratio * ratio[item.to_shaft] / ratio[item.from_shaft]
-            if a in known and b not in known:
-                known[b] = known[a] / whole
-            elif b in known and a not in known:
-                known[a] = known[b] * whole
-
-
 def stepped(drive: Drive) -> SteppedDrive:
     """Return the discrete-time functions of a drive."""
     mech = mechanism(drive)
@@ -302,6 +218,6 @@ def stepped(drive: Drive) -> SteppedDrive:
         step=ca.Function("step", arguments, [maps["step"].solved()]),
         output=ca.Function("output", arguments, [maps["output"].solved()]),
         tick=tick,
-        start=ca.Function("start", [y, dy, u, p], [_start(mech, y, dy)]),
+        start=ca.Function("start", [y, dy, u, p], [start_state(mech, y, dy)]),
         implicit={name: item.implicit(arguments) for name, item in maps.items() if item.unknowns},
     )

@@ -7,14 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.progress import Phases, Progress, silent
-from friction_ocp.estimation.stages import WIDTHS, free_run, losses, predictions, relaxed
+from friction_ocp.estimation.stages import (
+    WIDTHS,
+    free_run,
+    loss_of_round,
+    mean_error,
+    predictions,
+    relaxed,
+    rounds_of,
+)
 from friction_ocp.simulation.grid import FloatArray
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
@@ -22,8 +30,13 @@ FINE = Tolerances()
 EXPECTED_PHASES = 10
 GROWTH = (0.1, 0.3, 1.0)
 """Windows of a free run over its horizon, one after another, for a drive that drifts."""
-LAST_WIDTHS = (0.0,)
-RELEASES = (0.02, 0.1, 0.5, 1.0)
+HANDED_OVER = (0.1, 0.5, 0.8)
+"""Shares of the Coulomb friction with which the Stribeck part starts."""
+NOISE_SPREAD = 5.0
+"""Standard deviations of the chi-square of pure noise within which a fit counts as being at the noise floor."""
+FINALISTS = 4
+"""Starts that are followed to the end."""
+RELEASES = (0.05, 0.3, 1.0)
 """Stribeck and break speeds, over the typical speed of the drive, from which the released parameters start."""
 
 
@@ -43,14 +56,24 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     """
     phases, span = Phases(progress, EXPECTED_PHASES), horizon(model)
     held = is_held(model.problem.drive)
-    first = windowed(span) if held and fits_free_run(model) else joined
+    first = Plan(windowed(span), WIDTHS) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:])
     fitted = _staged(model, first, phases)
     if held or not fits_free_run(model):
         return fitted
     for share in GROWTH:
         grown = windowed(_longest(model, span) * share)
-        fitted = _finish(model, grown, _carried(model, fitted, grown), phases, LAST_WIDTHS)
+        program = grown(model, 0.0, fitted.program.loss)
+        solution = _solve(program, _carried(fitted, program), FINE, f"free run over {share:.0%} of the horizon", phases)
+        fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     return fitted
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which program is solved with which smoothing widths, one after another."""
+
+    builder: Builder
+    widths: tuple[float, ...]
 
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
@@ -77,9 +100,8 @@ def _longest(model: Model, span: float | None) -> float:
     return max(float(item.grid.time[-1] - item.grid.time[0]) for item in model.train)
 
 
-def _carried(model: Model, fitted: Fitted, builder: Builder) -> Point:
+def _carried(fitted: Fitted, program: Program) -> Point:
     """Start windows from the states that the program before them went through."""
-    program = builder(model, 0.0, Squares())
     nodes: list[FloatArray] = []
     for index, cut in enumerate(program.segments):
         track = fitted.program.simulate(index, fitted.solution.point, with_states=True).states
@@ -88,10 +110,18 @@ def _carried(model: Model, fitted: Fitted, builder: Builder) -> Point:
     return Point(fitted.solution.point.theta, tuple(nodes))
 
 
-def _staged(model: Model, builder: Builder, phases: Phases) -> Fitted:
-    candidates = _candidates(model, builder, phases)
-    best = _tournament(model, builder, candidates, "candidate", phases)
-    return _finish(model, builder, best, phases, WIDTHS)
+def _staged(model: Model, plan: Plan, phases: Phases) -> Fitted:
+    """Fit the simpler model first, if there is one, and the full model from several releases of what it leaves out."""
+    simple = nested_space(model.problem, model.space)
+    if simple is model.space:
+        return _rounds(model, plan, _plain_starts(model, phases), "fit", phases)
+    inner = replace(model, space=simple)
+    nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
+    return _rounds(model, plan, released(model, simple, nested.solution.point.theta), "fit", phases)
+
+
+def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
+    return [model.space.guess, _predicted(model, phases)]
 
 
 def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, phases: Phases) -> Solution:
@@ -105,53 +135,73 @@ def _predicted(model: Model, phases: Phases) -> FloatArray:
     return _solve(program, start, COARSE, "short predictions", phases).point.theta
 
 
-def _tournament(
-    model: Model, builder: Builder, starts: Sequence[FloatArray], phase: str, phases: Phases
-) -> Point:
-    """Solve the first stage from every start and return the best end."""
-    program = builder(model, WIDTHS[0], Squares())
+def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> Fitted:
+    """Sharpen width and loss round by round; after each the worse half of the starts drops out, down to a few."""
+    program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
-    loss = min((next(losses(model, program, point, 1)) for point in points), key=lambda item: getattr(item, "rounding", 0))
-    program = replace(program, loss=loss)
-    ends = [
-        _solve(program, point, COARSE, f"{phase} {k + 1} of {len(points)}", phases) for k, point in enumerate(points)
-    ]
-    return min(ends, key=lambda end: end.objective).point
+    points.sort(key=lambda point: mean_error(program, point))
+    rounds = rounds_of(model, len(plan.widths))
+    iterations, ends = 0, list[Solution]()
+    for k in range(rounds):
+        program = plan.builder(model, plan.widths[min(k, len(plan.widths) - 1)], Squares())
+        program = replace(program, loss=loss_of_round(model, program, points[0], k))
+        limits = replace(FINE, max_iterations=model.problem.estimation.max_iterations) if k == rounds - 1 else COARSE
+        ends = _race(program, points, limits, phases.begin(f"{name}, round {k + 1} of {rounds}"))
+        points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
+        iterations += sum(end.iterations for end in ends)
+    return Fitted(replace(ends[0], iterations=iterations), program)
 
 
-def _candidates(model: Model, builder: Builder, phases: Phases) -> list[FloatArray]:
-    """Return starts for the full model: the guess, the predictions, and what the nested model leads to."""
-    simple = nested_space(model.problem, model.space)
-    if simple is model.space:
-        return [model.space.guess, _predicted(model, phases)]
-    inner = replace(model, space=simple)
-    starts = [simple.guess, _predicted(inner, phases)]
-    best = _tournament(inner, builder, starts, "simpler friction", phases)
-    return released(model, simple, best.theta)
+def _race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch) -> list[Solution]:
+    """Solve from every point, best first; one that ends at the noise floor needs no rivals."""
+    floor = noise_level(program)
+    ends: list[Solution] = []
+    for point in points:
+        end = solve_gauss_newton(program, point, limits, watch)
+        if end.objective <= floor:
+            return [end]
+        ends.append(end)
+    return sorted(ends, key=lambda end: end.objective)
+
+
+def noise_level(program: Program) -> float:
+    """Return the objective that noise alone would rarely exceed, 0 for losses other than squares."""
+    if not isinstance(program.loss, Squares):
+        return 0.0
+    samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
+    return 0.5 * samples * (1.0 + NOISE_SPREAD * float(np.sqrt(2.0 / samples)))
 
 
 def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:
     """Return starts of the full model around the answer of the nested one.
 
-    What the nested model does not have starts from the guess, and from several places in the range of speeds.
+    What the nested model does not have starts from the guess, and from several places in the range of speeds with
+    several shares of the Coulomb friction handed over to the Stribeck part.
     """
     known = dict(zip(simple.names, theta, strict=True))
     speed = float(np.max(model.speed_scale[:-1]))
     starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
-    for share in RELEASES:
-        start = starts[0].copy()
-        for k, name in enumerate(model.space.names):
-            start[k] = _released_value(model.space, name, known, share * speed, start[k])
-        starts.append(start)
+    handed_over = HANDED_OVER if any(".tau_s" in name for name in model.space.names) else HANDED_OVER[:1]
+    for place in RELEASES:
+        for share in handed_over:
+            values = [
+                _released_value(model.space, name, known, place * speed, share, starts[0][k])
+                for k, name in enumerate(model.space.names)
+            ]
+            starts.append(np.array(values))
     return [model.space.clip(start) for start in starts]
 
 
 def _released_value(
-    space: ParameterSpace, name: str, known: dict[str, float], speed: float, default: float
+    space: ParameterSpace, name: str, known: dict[str, float], speed: float, share: float, default: float
 ) -> float:
     stem, _, last = name.partition("@")[0].rpartition(".")
+    if ".tau_s" in name:
+        return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
+    if name.endswith(".load.stribeck"):
+        return 2.0 * share * known.get(f"{stem}.coulomb", default)
     if name in known:
-        return known[name]
+        return (1.0 - share) * known[name] if _is_coulomb(name) else known[name]
     if ".omega_s" in name:
         return speed
     if stem.endswith(".breaks"):
@@ -159,20 +209,8 @@ def _released_value(
         return 2.0 * speed * (int(last) + 1) / (breaks + 1)
     if stem.endswith(".slopes"):
         return known.get(f"{stem}.0", default)
-    if ".tau_s" in name:
-        return 1.2 * known.get(name.replace(".tau_s", ".tau_c"), default)
     return default
 
 
-def _finish(model: Model, builder: Builder, point: Point, phases: Phases, widths: Sequence[float]) -> Fitted:
-    """Sharpen width and loss down to the exact problem."""
-    program = builder(model, widths[0], Squares())
-    stages = list(losses(model, program, point, len(widths)))
-    iterations, solution = 0, None
-    for k, loss in enumerate(stages):
-        last = k == len(stages) - 1
-        program = builder(model, widths[min(k, len(widths) - 1)], loss)
-        solution = _solve(program, point, FINE if last else COARSE, f"stage {k + 1} of {len(stages)}", phases)
-        point, iterations = solution.point, iterations + solution.iterations
-    assert solution is not None
-    return Fitted(replace(solution, iterations=iterations), program)
+def _is_coulomb(name: str) -> bool:
+    return ".friction.tau_c" in name or name.endswith(".friction.load.coulomb")

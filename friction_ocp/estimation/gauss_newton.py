@@ -40,7 +40,7 @@ class Tolerances:
     negligible: float = 1e-4
     """Predicted decrease that is too small to matter whatever the objective: residuals are in noise floors, so that
     it moves no combination of parameters by more than sqrt(2e-4) of its standard error."""
-    progress: float = 1e-7
+    progress: float = 1e-6
     """Actual decrease of three steps in a row, relative to the objective."""
     stalled: float = 1e-4
     """The same, where no damped step decreases the objective any more (kinks of the friction law)."""

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, trial_step
+from friction_ocp.estimation.nlp_layout import NlpLayout
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import FloatArray
 
 OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -39,6 +39,7 @@ OPTIONS: dict[str, Any] = {
 ON_BOUND = 1e-7
 """Ipopt stays inside the bounds; what is closer, in typical sizes of the parameter, is on the bound."""
 
+DEFAULT = Tolerances()
 SETTLED = "the predicted decrease is below the tolerance"
 SLOW = "three steps in a row gained next to nothing"
 FAILED = {
@@ -49,7 +50,7 @@ FAILED = {
 
 
 def solve_ipopt(
-    program: Program, start: Point, tolerances: Tolerances = Tolerances(), watch: Watch | None = None
+    program: Program, start: Point, tolerances: Tolerances = DEFAULT, watch: Watch | None = None
 ) -> Solution:
     """Minimise a program from a start; the contract is that of `solve_gauss_newton`.
 
@@ -93,90 +94,6 @@ def _solution(program: Program, end: Point, status: str, iterations: int, tolera
         text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
         text = FAILED.get(status, f"{text} (Ipopt: {status})")
     return Solution(end, system.objective, iterations, False, text)
-
-
-@dataclass(frozen=True)
-class NlpLayout:
-    """Where every variable and every Hessian entry stands: nodes of all recordings, then the parameters.
-
-    Nodes that the measurement gives are no variables. All variables are scaled to the size of one.
-    """
-
-    index: tuple[IntArray, ...]
-    """By recording (segments, states): the variable of each node state, -1 where it is none."""
-    theta: IntArray
-    """(parameters,) the variable of each parameter."""
-    scale: FloatArray
-    """(variables,) value of one unit of each variable."""
-    hessian: ca.Sparsity
-    """Upper triangle."""
-    entries: IntArray
-    """Which of the stacked Hessian blocks stand in the upper triangle, column by column."""
-
-    @classmethod
-    def of(cls, program: Program, point: Point) -> NlpLayout:
-        """Lay out the variables of a program; `point` gives the typical size of the states."""
-        index: list[IntArray] = []
-        count = 0
-        for cut, nodes in zip(program.segments, point.nodes, strict=True):
-            variables = np.full(nodes.shape, -1, dtype=np.int64)
-            free = nodes[cut.measured :].size
-            variables[cut.measured :] = (count + np.arange(free)).reshape(-1, nodes.shape[1])
-            index.append(variables)
-            count += free
-        theta = count + np.arange(point.theta.size)
-        scale = np.ones(count + theta.size)
-        size = _state_size(point)
-        for variables in index:
-            scale[variables[variables >= 0]] = np.broadcast_to(size, variables.shape)[variables >= 0]
-        scale[theta] = program.space.scale
-        hessian, entries = _pattern(tuple(index), theta)
-        return cls(tuple(index), theta, scale, hessian, entries)
-
-    def pack(self, theta: FloatArray, nodes: Sequence[FloatArray]) -> FloatArray:
-        """Return the vector of variables, not scaled, of parameters and node states (or their gradients)."""
-        x = np.zeros(self.scale.size)
-        for variables, values in zip(self.index, nodes, strict=True):
-            x[variables[variables >= 0]] = values[variables >= 0]
-        x[self.theta] = theta
-        return x
-
-    def point(self, x: FloatArray, like: Point) -> Point:
-        """Return the point of scaled variables; nodes that are no variables are those of `like`."""
-        values = x * self.scale
-        nodes = [np.where(index >= 0, values[index], old) for index, old in zip(self.index, like.nodes, strict=True)]
-        return Point(values[self.theta], tuple(nodes))
-
-    def hessian_values(self, system: Linearisation) -> FloatArray:
-        """Return the entries of the upper triangle in scaled variables, column by column."""
-        blocks = [(item.node_node, item.node_next, item.node_theta) for item in system.blocks]
-        stacked = np.concatenate([block.ravel() for item in (*blocks, (system.theta_theta,)) for block in item])
-        row, column = (np.asarray(axis) for axis in self.hessian.get_triplet())
-        return stacked[self.entries] * self.scale[row] * self.scale[column]
-
-
-def _state_size(point: Point) -> FloatArray:
-    spread = np.sqrt(np.mean(np.concatenate(point.nodes) ** 2, axis=0))
-    return np.where(spread > 0, spread, 1.0)
-
-
-def _pattern(index: tuple[IntArray, ...], theta: IntArray) -> tuple[ca.Sparsity, IntArray]:
-    """Return the pattern of the Hessian and where its entries stand in the stacked blocks."""
-    rows: list[IntArray] = []
-    columns: list[IntArray] = []
-    for variables in index:
-        border = np.broadcast_to(theta, (len(variables), theta.size))
-        for left, right in ((variables, variables), (variables[:-1], variables[1:]), (variables, border)):
-            pairs = np.broadcast_arrays(left[:, :, None], right[:, None, :])
-            rows.append(pairs[0].ravel())
-            columns.append(pairs[1].ravel())
-    rows.append(np.repeat(theta, theta.size))
-    columns.append(np.tile(theta, theta.size))
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    chosen = np.flatnonzero((row >= 0) & (column >= 0) & (row <= column))
-    chosen = chosen[np.lexsort((row[chosen], column[chosen]))]
-    count = theta[-1] + 1
-    return ca.Sparsity.triplet(count, count, row[chosen].tolist(), column[chosen].tolist()), chosen
 
 
 class _Evaluations:
@@ -263,7 +180,7 @@ def constraint_rows(space: ParameterSpace, theta: FloatArray) -> tuple[FloatArra
 
 
 @contextmanager
-def _deferred_interrupt(evaluations: _Evaluations) -> Iterator[None]:
+def _deferred_interrupt(evaluations: _Evaluations) -> Generator[None]:
     """Let Ctrl-C set `stop` instead of raising inside Ipopt."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -280,7 +197,7 @@ def _deferred_interrupt(evaluations: _Evaluations) -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-Evaluate = Callable[[list[ca.DM]], list[Any]]
+Evaluate = Callable[[Sequence[ca.DM]], list[Any]]
 
 
 class _Callback(ca.Callback):
@@ -311,7 +228,7 @@ class _Callback(ca.Callback):
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
         return list(self._outputs.values())[i]
 
-    def eval(self, arg: list[ca.DM]) -> list[Any]:
+    def eval(self, arg: Sequence[ca.DM]) -> list[Any]:
         return self._evaluate(arg)
 
 
@@ -347,20 +264,20 @@ def _functions(layout: NlpLayout, evaluations: _Evaluations) -> dict[str, _Callb
     jacobian = ca.horzcat(ca.Sparsity(rows, layout.scale.size - len(layout.theta)), jacobian)
     at, results = {"x": x, "p": none}, {"x": x, "f": scalar, "g": g, "lam_x": x, "lam_g": g, "lam_p": none}
 
-    def values(arg: list[ca.DM]) -> list[Any]:
+    def values(arg: Sequence[ca.DM]) -> list[Any]:
         return [evaluations.objective(_column(arg[0])), evaluations.margins(_column(arg[0]))[0]]
 
-    def gradient(arg: list[ca.DM]) -> list[Any]:
+    def gradient(arg: Sequence[ca.DM]) -> list[Any]:
         return [evaluations.objective(_column(arg[0])), evaluations.gradient(_column(arg[0]))]
 
-    def slopes(arg: list[ca.DM]) -> list[Any]:
+    def slopes(arg: Sequence[ca.DM]) -> list[Any]:
         margins, by_theta = evaluations.margins(_column(arg[0]))
         return [margins, ca.DM(jacobian, by_theta.ravel(order="F"))]
 
-    def hessian(arg: list[ca.DM]) -> list[Any]:
+    def hessian(arg: Sequence[ca.DM]) -> list[Any]:
         return [ca.DM(layout.hessian, evaluations.hessian(_column(arg[0]), float(arg[2])))]
 
-    def report(arg: list[ca.DM]) -> list[Any]:
+    def report(arg: Sequence[ca.DM]) -> list[Any]:
         return [evaluations.report(_column(arg[0]))]
 
     return {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +16,9 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 PREDICTION_SAMPLES = 20
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01)
 """Rounding of the absolute loss over the mean error, stage by stage."""
-WIDTHS = (0.02, 0.0)
-"""Smoothing of the sign over the typical speed, stage by stage; the last is exact."""
+WIDTHS = (0.1, 0.02, 0.0)
+"""Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the
+first: there a wide smoothing only invents slopes and breaks at low speed."""
 
 
 @dataclass(frozen=True)
@@ -112,15 +112,19 @@ def mean_error(program: Program, point: Point) -> float:
     return float(np.mean(np.concatenate(sizes)))
 
 
-def losses(model: Model, program: Program, point: Point, stages: int) -> Iterator[AbstractLoss]:
-    """Yield the losses of the successive stages of a fit; the absolute loss takes its own number of stages."""
+def rounds_of(model: Model, widths: int) -> int:
+    """Return how many rounds a fit takes: the absolute loss needs its own number of roundings."""
+    return max(widths, len(ROUNDINGS)) if model.problem.estimation.loss == "absolute" else widths
+
+
+def loss_of_round(model: Model, program: Program, best: Point, number: int) -> AbstractLoss:
+    """Return the loss of a round; the absolute loss is rounded relative to the error of the best point so far."""
     match model.problem.estimation.loss:
         case "squares":
-            yield from (Squares(),) * stages
+            return Squares()
         case "huber":
-            yield from (Huber(),) * stages
+            return Huber()
         case "student_t":
-            yield from (StudentT(),) * stages
+            return StudentT()
         case "absolute":
-            size = mean_error(program, point)
-            yield from (Absolute(rounding * size) for rounding in ROUNDINGS)
+            return Absolute(ROUNDINGS[min(number, len(ROUNDINGS) - 1)] * mean_error(program, best))

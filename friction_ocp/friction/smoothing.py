@@ -18,7 +18,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     """Choose elementwise; SX conditions become `if_else`."""
     if isinstance(condition, ca.SX):
         return ca.if_else(condition, ca.SX(yes), ca.SX(no))
-    return np.where(condition, yes, no)
+    return np.where(condition, yes, no)  # pyright: ignore[reportUnknownVariableType]
 
 
 def exp(value: Any) -> Any:

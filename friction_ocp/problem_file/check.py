@@ -27,9 +27,10 @@ def check_file(problem: Problem) -> tuple[Finding, ...]:
     return _errors(_run(Case(problem), MODEL, WHOLE))
 
 
-def check_rest(problem: Problem, recording_places: tuple[str, ...]) -> tuple[Finding, ...]:
-    """Return the errors of what is left of a problem whose faulty parts were taken out."""
-    return _errors(_run(Case(problem, recording_places), (*MODEL, *recordings.RECORDINGS), ()))
+def check_rest(problem: Problem, recording_places: tuple[str, ...], complete: bool) -> tuple[Finding, ...]:
+    """Return the errors of what is left of a problem; `complete` if only recordings were taken out."""
+    whole = WHOLE if complete else ()
+    return _errors(_run(Case(problem, recording_places), (*MODEL, *recordings.RECORDINGS), whole))
 
 
 def _run(case: Case, rules: Iterable[Rule], if_named: Iterable[Rule]) -> tuple[Finding, ...]:

@@ -43,13 +43,13 @@ def load_problem(path: str | Path) -> Problem:
     section, faults = read_section(document.content)
     uses, findings = _read_recordings(document)
     findings = [*(fault.finding(str(path)) for fault in faults), *findings]
-    intact = section is not None and not findings
-    section = section or salvage(document.content, faults)
-    if section is None:
+    rest = section or salvage(document.content, faults)
+    if rest is None:
         raise FrictionOcpError(findings)
-    problem = _build(section, uses, document)
-    if not intact:
-        raise FrictionOcpError([*findings, *check_rest(problem, tuple(entry.place for entry, _ in uses))])
+    problem = _build(rest, uses, document)
+    if findings:
+        places = tuple(entry.place for entry, _ in uses)
+        raise FrictionOcpError([*findings, *check_rest(problem, places, complete=section is not None)])
     if check_file(problem):
         raise FrictionOcpError([finding for finding in check(problem) if finding.severity == "error"])
     return problem

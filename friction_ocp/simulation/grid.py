@@ -63,11 +63,10 @@ def controller_ticks(controller: Controller | None, samples: FloatArray) -> tupl
     if np.all(np.abs(steps - controller.sample_time) < OWN_RATE * controller.sample_time):
         compute = samples
     else:
-        compute = start + controller.sample_time * np.arange(
-            int(np.floor((end - start) / controller.sample_time + 1e-9)) + 1
-        )
-    apply = compute + controller.delay if controller.delay > 0 else np.empty(0)
-    return compute, apply[apply <= end]
+        count = int(np.floor((end - start) / controller.sample_time + 1e-9)) + 1
+        compute = np.asarray(start + controller.sample_time * np.arange(count), dtype=np.float64)
+    apply = np.asarray(compute + controller.delay, dtype=np.float64)
+    return compute, apply[apply <= end] if controller.delay > 0 else np.empty(0)
 
 
 def _merge(times: list[FloatArray], tolerance: float) -> FloatArray:

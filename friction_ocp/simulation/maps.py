@@ -21,8 +21,6 @@ class SweepMap:
     """Symbols of the unknown torques; empty for an explicit map."""
     value: ca.SX
     found: ca.SX
-    start: ca.SX
-    """The torques as a function of the arguments alone."""
 
     @property
     def unknowns(self) -> int:
@@ -58,6 +56,23 @@ class SweepMap:
         return self._function(
             f"{self.name}_d", [self.torques] if self.unknowns else [], [self.value, by_state, by_active]
         )
+
+    def solved(self, active: Sequence[int] | None, newton_steps: int) -> ca.Function:
+        """Return (arguments, torques to start from) -> value, torques and, by `active`, the two Jacobians.
+
+        The number of Newton's steps is fixed; without `active` there are no Jacobians.
+        """
+        *equations, value = self.value_functions()
+        torques, after = self.torques, list(self.arguments)
+        if self.unknowns:
+            constants = equations[0].call(list(self.arguments), True, False)[0]
+            for _ in range(newton_steps):
+                torques = equations[1].call([*self.arguments, torques, constants], True, False)[0]
+            after = [*self.arguments, torques, constants]
+        values = [value.call(after, True, False)[0], torques]
+        if active is not None:
+            values += self.derivative(active).call(after[: len(self.arguments) + bool(self.unknowns)], True, False)[1:]
+        return ca.Function(f"{self.name}_s", [*self.arguments, self.torques], values, {"cse": True})
 
     def _total(self, by: ca.SX) -> ca.SX:
         if by.numel() == 0:
@@ -100,7 +115,7 @@ def _symbols(function: ca.Function) -> list[ca.SX]:
 
 def _explicit(name: str, arguments: Sequence[ca.SX], value: ca.SX) -> SweepMap:
     none = ca.SX(0, 1)
-    return SweepMap(name, tuple(arguments), none, ca.cse(value), none, none)
+    return SweepMap(name, tuple(arguments), none, ca.cse(value), none)
 
 
 def _implicit(name: str, drive: SteppedDrive) -> SweepMap:
@@ -111,16 +126,7 @@ def _implicit(name: str, drive: SteppedDrive) -> SweepMap:
         return _explicit(f"fo_{name}", arguments, function.call(arguments, True, False)[0])
     *arguments, torques = _symbols(implicit.relation)
     value, found = implicit.relation.call([*arguments, torques], True, False)
-    return _without_idle_torques(
-        SweepMap(
-            name=f"fo_{name}",
-            arguments=tuple(arguments),
-            torques=torques,
-            value=value,
-            found=found,
-            start=implicit.torques.call(arguments, True, False)[0],
-        )
-    )
+    return _without_idle_torques(SweepMap(f"fo_{name}", tuple(arguments), torques, value, found))
 
 
 def _without_idle_torques(item: SweepMap) -> SweepMap:
@@ -129,7 +135,7 @@ def _without_idle_torques(item: SweepMap) -> SweepMap:
         return _explicit(item.name, item.arguments, item.value)
     stacked = ca.cse(ca.vertcat(item.value, item.found))
     split = item.value.numel()
-    return SweepMap(item.name, item.arguments, item.torques, stacked[:split], stacked[split:], item.start)
+    return SweepMap(item.name, item.arguments, item.torques, stacked[:split], stacked[split:])
 
 
 def _without_delay(output: SweepMap, delays: tuple[int, ...]) -> SweepMap:
@@ -137,6 +143,4 @@ def _without_delay(output: SweepMap, delays: tuple[int, ...]) -> SweepMap:
     value = ca.simplify(ca.substitute(output.value, symbols, ca.SX.zeros(len(delays))))
     if not output.unknowns:
         return _explicit("fo_now", output.arguments, value)
-    return _without_idle_torques(
-        SweepMap("fo_now", output.arguments, output.torques, value, output.found, output.start)
-    )
+    return _without_idle_torques(SweepMap("fo_now", output.arguments, output.torques, value, output.found))

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -95,9 +96,9 @@ def _pieces(requests: Sequence[SweepRequest], threads: int) -> list[tuple[int, i
     pieces: list[tuple[int, int, int, int]] = []
     for index, count in enumerate(steps):
         parts = max(1, min(len(count), round(int(count.sum()) / share)))
-        edges = np.searchsorted(np.cumsum(count), count.sum() * np.arange(1, parts) / parts)
-        cuts = [0, *(int(edge) + 1 for edge in edges), len(count)]
-        pieces += [(int(count[a:b].sum()), index, a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
+        goals: FloatArray = count.sum() * np.arange(1, parts) / parts
+        cuts = [0, *(int(edge) + 1 for edge in np.searchsorted(np.cumsum(count), goals)), len(count)]
+        pieces += [(int(count[a:b].sum()), index, a, b) for a, b in pairwise(cuts) if b > a]
     if total < 2 * STEPS_WORTH_A_THREAD:
         return [(index, 0, len(request.first) - 1) for index, request in enumerate(requests)]
     return [(index, a, b) for _, index, a, b in sorted(pieces, reverse=True)]

@@ -91,7 +91,7 @@ def _controller(controller: PlantController, output: str) -> Controller:
 
 
 def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
-    """Return the drive under test: inputs by their signals, the plant's sensors and all angles and speeds as outputs."""
+    """Return the drive under test: inputs by their signals; outputs are the plant's sensors, all angles and speeds."""
     driven = [Channel(name, name, "input") for name in inputs]
     sensors = [Channel(s.name, s.measures, "output", s.gain, s.offset, s.delay, s.resolution) for s in plant.sensors]
     seen = [f"{shaft.name}.{signal}" for shaft in plant.shafts for signal in ("theta", "omega")]
@@ -102,7 +102,12 @@ def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
         shafts=tuple(_shaft(shaft) for shaft in plant.shafts),
         transmissions=tuple(
             Transmission(
-                t.from_shaft, t.to_shaft, t.ratio, t.stiffness if np.isfinite(t.stiffness) else None, t.damping, t.backlash
+                t.from_shaft,
+                t.to_shaft,
+                t.ratio,
+                t.stiffness if np.isfinite(t.stiffness) else None,
+                t.damping,
+                t.backlash,
             )
             for t in plant.transmissions
         ),

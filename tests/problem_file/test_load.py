@@ -13,7 +13,7 @@ from problem_workshop import Workshop
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.static import Polyline
-from friction_ocp.parameters import Directional, Free, Tie
+from friction_ocp.parameters import Free, Tie
 from friction_ocp.problem_file.check import check
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording

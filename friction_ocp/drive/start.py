@@ -1,0 +1,65 @@
+"""The state in which a drive starts, as its measured motion suggests it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from friction_ocp.drive.coordinates import pick, prescribed_motion
+from friction_ocp.drive.mechanism import Mechanism, Motion, column
+
+
+def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
+    """Return the state that measured motion suggests: no twist, bristles as deflected by steady motion."""
+    q, v = _measured_motion(mech, y, dy)
+    at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
+    deflections = [shaft.friction.steady_deflection(mech.shaft_speed(shaft.name, v)) for shaft in mech.bristles]
+    memory = [_first_memory(mech, at, name) for name in mech.memory_names]
+    return ca.vertcat(
+        pick(q, mech.angle_groups), pick(v, mech.free_groups), column(deflections), at.extra, column(memory)
+    )
+
+
+def _first_memory(mech: Mechanism, at: Motion, name: str) -> Any:
+    if not name.startswith("controller.previous"):
+        return 0.0
+    controller, seen = mech.drive.controller, mech.seen(at)
+    assert controller is not None and controller.sample_time is not None
+    return seen.theta - (1.0 if name.endswith("1") else 2.0) * controller.sample_time * seen.omega
+
+
+def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return group angles and speeds from the channels that see them, else through the transmissions."""
+    q, v = dict[int, Any](), dict[int, Any]()
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part)
+        if group is None or channel.signal == "alpha":
+            continue
+        ratio = mech.topology.speed_ratio[channel.part] * channel.gain
+        if channel.signal == "theta":
+            q.setdefault(group, (y[k] - channel.offset) / ratio)
+            v[group] = dy[k] / ratio
+        else:
+            v.setdefault(group, (y[k] - channel.offset) / ratio)
+    for group in mech.prescribed:
+        v[group] = prescribed_motion(mech, group, "omega")
+        if mech.prescribed[group] == "theta":
+            q[group] = prescribed_motion(mech, group, "theta")
+    for known in (q, v):
+        _spread(mech, known)
+    groups = range(len(mech.topology.roots))
+    return column([q.get(g, 0.0) for g in groups]), column([v.get(g, 0.0) for g in groups])
+
+
+def _spread(mech: Mechanism, known: dict[int, Any]) -> None:
+    """Carry angles or speeds over elastic transmissions to groups that no channel sees."""
+    ratio, group_of = mech.topology.speed_ratio, mech.topology.group_of
+    for _ in mech.topology.elastic:
+        for item in mech.topology.elastic:
+            a, b = group_of[item.from_shaft], group_of[item.to_shaft]
+            whole = item.ratio * ratio[item.to_shaft] / ratio[item.from_shaft]
+            if a in known and b not in known:
+                known[b] = known[a] / whole
+            elif b in known and a not in known:
+                known[a] = known[b] * whole
