@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from friction_ocp.recording.hdf5 import read_recording, write_recording
     from friction_ocp.recording.import_recording import import_recording
     from friction_ocp.recording.recording import Channel, Recording
-    from friction_ocp.save import save
+    from friction_ocp.result_folder import save
 
 _HOMES = {
     "Channel": "recording.recording",
@@ -32,7 +32,7 @@ _HOMES = {
     "import_recording": "recording.import_recording",
     "load_problem": "problem_file.load",
     "read_recording": "recording.hdf5",
-    "save": "save",
+    "save": "result_folder",
     "simulate": "estimation.estimate",
     "write_recording": "recording.hdf5",
 }

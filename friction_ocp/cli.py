@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from friction_ocp.errors import Finding, FrictionOcpError
 
 if TYPE_CHECKING:
     from friction_ocp.estimation.problem import Problem
+    from friction_ocp.estimation.progress import Progress, Report
 
 DONE, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 1, 2, 3
 
@@ -29,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(finding, file=sys.stderr)
         return WRONG_INPUT
     except KeyboardInterrupt:
-        print(f"{options.command}: interrupted before there was a result", file=sys.stderr)
+        print(f"{options.command}: interrupted", file=sys.stderr)
         return INTERRUPTED
 
 
@@ -37,8 +39,43 @@ def _interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
 
 
+class _Patience:
+    """Lets the first interrupt wait for the end of a step; a second one stops at once.
+
+    An exception raised while CasADi calls back into Python would be lost or come out as another one.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._ask)
+
+    def _ask(self, number: int, frame: object) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+    def watching(self, progress: Progress) -> Progress:
+        """Return `progress` that stops the fit after a step if that was asked for."""
+
+        def update(report: Report) -> None:
+            progress(report)
+            if self.asked:
+                raise KeyboardInterrupt
+
+        return update
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints end as wrong input does; argparse's own status 2 means something else here."""
+
+    def error(self, message: str) -> NoReturn:
+        self.print_usage(sys.stderr)
+        self.exit(WRONG_INPUT, f"{self.prog}: {message}\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="friction-ocp",
         description="Finds the friction in a drive from its own logs.",
         epilog="Exit status: 0 done, 1 the input is wrong, 2 the solver did not converge, 3 interrupted.",
@@ -68,7 +105,14 @@ def _add_job(commands: Any, name: str, text: str, run: Callable[[argparse.Namesp
 
 
 def _folder(options: argparse.Namespace) -> Path:
-    return options.out or Path("results") / f"{options.problem.stem}-{options.command}"
+    """Return the output folder; refuse one that cannot be written before any work is done."""
+    folder: Path = options.out or Path("results") / f"{options.problem.stem}-{options.command}"
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise FrictionOcpError(Finding(str(folder), f"{there} is a file", "a folder, made where there is none"))
+    if not os.access(there, os.W_OK):
+        raise FrictionOcpError(Finding(str(folder), f"{there} may not be written to", remedy="give another --out"))
+    return folder
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -107,43 +151,43 @@ def _checked(options: argparse.Namespace) -> Problem:
 
 def _simulate(options: argparse.Namespace) -> int:
     from friction_ocp.estimation.estimate import simulate
-    from friction_ocp.result_document import simulation_document
-    from friction_ocp.save import save
+    from friction_ocp.result_folder import save
 
-    result = simulate(_checked(options))
-    folder = save(result, _folder(options))
-    _show(options, simulation_document(result), folder)
+    folder = _folder(options)
+    save(simulate(_checked(options)), folder)
+    _show(options, folder)
     return DONE
 
 
 def _identify(options: argparse.Namespace) -> int:
     from friction_ocp.estimation.estimate import Interrupted, identify
     from friction_ocp.progress_bar import progress_bar
-    from friction_ocp.result_document import estimate_document
-    from friction_ocp.save import save
+    from friction_ocp.result_folder import save
 
-    problem = _checked(options)
-    status = DONE
+    folder, problem, patience = _folder(options), _checked(options), _Patience()
     try:
         with progress_bar() as progress:
-            estimate = identify(problem, progress)
+            estimate = identify(problem, patience.watching(progress))
     except Interrupted as stopped:
-        estimate, status = stopped.estimate, INTERRUPTED
-    folder = save(estimate, _folder(options))
-    _show(options, estimate_document(estimate), folder)
-    if status == DONE and not estimate.converged:
+        estimate = stopped.estimate
+    save(estimate, folder)
+    _show(options, folder)
+    if patience.asked:
+        return INTERRUPTED
+    if not estimate.converged:
         print(f"identify: {estimate.message}", file=sys.stderr)
         return NOT_CONVERGED
-    return status
+    return DONE
 
 
-def _show(options: argparse.Namespace, document: dict[str, Any], folder: Path) -> None:
+def _show(options: argparse.Namespace, folder: Path) -> None:
+    text = (folder / "result.json").read_text(encoding="utf-8")
     if options.json:
-        print(json.dumps(document, indent=1))
+        print(text)
         return
     from friction_ocp.report.text import summary
 
-    print(summary(document))
+    print(summary(json.loads(text)))
     print(f"Report: {folder / 'report.html'}")
 
 

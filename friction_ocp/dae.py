@@ -18,7 +18,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 FloatArray = npt.NDArray[np.float64]
 
 SINGULAR = 1e-12
-"""Ratio of smallest to largest singular value of the scaled dg/dz below which it counts as singular."""
+"""Singular value of dg/dz below which it counts as singular; each equation is scaled by its largest derivative."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,14 @@ class Dae:
             raise FrictionOcpError(
                 Finding(f"algebraic variables {names}", what, "as many equations as variables", remedy)
             )
-        matrix = self._at(values, slope)
-        scaled = matrix / np.maximum(np.abs(matrix).max(axis=1, keepdims=True), np.finfo(float).tiny)
+        everything = self._at(values, ca.jacobian(self.alg, ca.vertcat(self.z, self.x, self.u)))
+        size = np.maximum(np.abs(everything).max(axis=1, keepdims=True), np.finfo(float).tiny)
+        matrix = everything[:, :count]
+        scaled = matrix / size
         _, sizes, directions = np.linalg.svd(scaled)
-        if not np.all(np.isfinite(matrix)) or sizes[-1] <= SINGULAR * sizes[0]:
+        if not np.all(np.isfinite(matrix)) or sizes[-1] <= SINGULAR:
             loosest = self.algebraic[int(np.argmax(np.abs(directions[-1])))]
-            what = f"not determined by the other variables: dg/dz has rank {int(np.sum(sizes > SINGULAR * sizes[0]))}"
+            what = f"not determined by the other variables: dg/dz has rank {int(np.sum(sizes > SINGULAR))}"
             raise FrictionOcpError(Finding(loosest.name, f"{what} of {count}", "index 1", remedy))
 
     def linearise(self, values: Mapping[str, float]) -> Linearisation:

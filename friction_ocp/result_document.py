@@ -18,6 +18,7 @@ from friction_ocp.estimation.score import Errors, FreeRun
 from friction_ocp.estimation.whiteness import Whiteness
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries, StateSeries
+from friction_ocp.simulation.grid import FloatArray
 
 FORMAT = "friction-ocp-result/1"
 SIMULATION_FORMAT = "friction-ocp-simulation/1"
@@ -130,8 +131,12 @@ def _errors(errors: Errors) -> dict[str, float | None]:
     return {name: _number(getattr(errors, name)) for name in names}
 
 
-def _matrix(values: Any) -> list[list[float | None]]:
-    return [[_number(value) for value in row] for row in np.asarray(values)]
+def _numbers(values: FloatArray) -> list[float | None]:
+    return [_number(value) for value in values]
+
+
+def _matrix(values: FloatArray) -> list[list[float | None]]:
+    return [_numbers(row) for row in values]
 
 
 def _curve(curve: FrictionCurve, problem: Problem) -> dict[str, Any]:
@@ -141,10 +146,10 @@ def _curve(curve: FrictionCurve, problem: Problem) -> dict[str, Any]:
         "law": curve.law,
         "load": curve.load,
         "load_unit": si_unit("torque", motion),
-        "speed": curve.speed.tolist(),
-        "torque": curve.torque.tolist(),
-        "lower": curve.lower.tolist(),
-        "upper": curve.upper.tolist(),
+        "speed": _numbers(curve.speed),
+        "torque": _numbers(curve.torque),
+        "lower": _numbers(curve.lower),
+        "upper": _numbers(curve.upper),
         "speed_unit": si_unit("speed", motion),
         "torque_unit": si_unit("torque", motion),
     }
@@ -152,10 +157,10 @@ def _curve(curve: FrictionCurve, problem: Problem) -> dict[str, Any]:
 
 def _whiteness(test: Whiteness) -> dict[str, Any]:
     return {
-        "lag_s": test.lag_s.tolist(),
-        "autocorrelation": test.autocorrelation.tolist(),
-        "band": test.band,
-        "p_value": test.p_value,
+        "lag_s": _numbers(test.lag_s),
+        "autocorrelation": _numbers(test.autocorrelation),
+        "band": _number(test.band),
+        "p_value": _number(test.p_value),
         "white": test.white,
     }
 
@@ -189,5 +194,3 @@ def _series(run: FreeRun, simulation: Simulation) -> RecordingSeries:
             )
     states = {name: run.states[:, k] for k, name in enumerate(simulation.state_names)}
     return RecordingSeries(channels, StateSeries(run.time, states))
-
-

@@ -19,7 +19,7 @@ from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.friction.element import FrictionElement, StepResponse
 from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, where
 
-NEWTON_STEPS = 3
+NEWTON_STEPS = 6
 NO_LEVEL = 1e-100
 """Keeps the shares of shafts and their derivatives finite where no shaft of a group has dry friction."""
 

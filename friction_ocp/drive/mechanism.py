@@ -174,8 +174,7 @@ class Mechanism:
     def motor_torque(self, motor: Motor, motion: Motion) -> Any:
         """Return the torque of a motor on its shaft, 0 while it is not enabled."""
         torque = self.true_input(f"{motor.name}.torque")
-        if torque is None:
-            torque = self._commanded(motor, "torque", motion)
+        torque = self._commanded(motor, "torque", motion) if torque is None else motor.share * torque
         if torque is not None:
             return self._enabled(motor, torque)
         current = self.motor_current(motor, motion)

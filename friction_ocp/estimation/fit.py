@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
-from friction_ocp.estimation.losses import AbstractLoss, Squares
+from friction_ocp.estimation.losses import Absolute, AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.stages import (
+    ROUNDINGS,
     WIDTHS,
     free_run,
     loss_of_round,
@@ -27,16 +29,20 @@ from friction_ocp.simulation.grid import FloatArray
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()
-EXPECTED_PHASES = 10
+EXPECTED_PHASES = 16
 GROWTH = (0.1, 0.3, 1.0)
 """Windows of a free run over its horizon, one after another, for a drive that drifts."""
-HANDED_OVER = (0.1, 0.5, 0.8)
-"""Shares of the Coulomb friction with which the Stribeck part starts."""
+RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
+"""Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
+SHARES = (0.3, 1.0)
+"""Stribeck parts over the Coulomb friction from which the released parameters start."""
 NOISE_SPREAD = 5.0
 """Standard deviations of the chi-square of pure noise within which a fit counts as being at the noise floor."""
-FINALISTS = 4
+HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
+"""Restarts around the best end of a loss with kinks: by what share the quadratic model calls them worse."""
+FINALISTS = 5
 """Starts that are followed to the end."""
-RELEASES = (0.05, 0.3, 1.0)
+RELEASES = (0.02, 0.04, 0.2, 1.0)
 """Stribeck and break speeds, over the typical speed of the drive, from which the released parameters start."""
 
 
@@ -57,7 +63,7 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     phases, span = Phases(progress, EXPECTED_PHASES), horizon(model)
     held = is_held(model.problem.drive)
     first = Plan(windowed(span), WIDTHS) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:])
-    fitted = _staged(model, first, phases)
+    fitted = _hop(model, _staged(model, first, phases), phases)
     if held or not fits_free_run(model):
         return fitted
     for share in GROWTH:
@@ -117,7 +123,8 @@ def _staged(model: Model, plan: Plan, phases: Phases) -> Fitted:
         return _rounds(model, plan, _plain_starts(model, phases), "fit", phases)
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
-    return _rounds(model, plan, released(model, simple, nested.solution.point.theta), "fit", phases)
+    starts = released(model, simple, nested.solution.point.theta)
+    return _rounds(model, replace(plan, widths=RELEASED_WIDTHS), starts, "fit", phases)
 
 
 def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
@@ -152,6 +159,35 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     return Fitted(replace(ends[0], iterations=iterations), program)
 
 
+def _hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
+    """Leave local minima of a loss with kinks: restart from points that the quadratic model calls slightly worse."""
+    program, best, iterations = fitted.program, fitted.solution, fitted.solution.iterations
+    if not isinstance(program.loss, Absolute):
+        return fitted
+    rng = np.random.default_rng(model.problem.estimation.seed)
+    coarse = replace(program, loss=Absolute(ROUNDINGS[-2] * mean_error(program, best.point)))
+    for k, hop in enumerate(HOPS):
+        watch = phases.begin(f"hop {k + 1} of {len(HOPS)}")
+        reduced = reduce_system(program.linearise(best.point), 1e-6)
+        step = _on_ellipsoid(reduced.hessian, 2.0 * hop * best.objective, rng)
+        theta = model.space.clip(best.point.theta + step)
+        nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
+        point = solve_gauss_newton(coarse, Point(theta, nodes), COARSE, watch).point
+        end = solve_gauss_newton(program, point, FINE, watch)
+        iterations += end.iterations
+        best = min(best, end, key=lambda solution: solution.objective)
+    return Fitted(replace(best, iterations=iterations), program)
+
+
+def _on_ellipsoid(hessian: FloatArray, size: float, rng: np.random.Generator) -> FloatArray:
+    """Return a random d with d'Hd = size."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    values, vectors = np.linalg.eigh(hessian * np.outer(scale, scale))
+    direction = rng.standard_normal(scale.size)
+    direction *= np.sqrt(size) / np.linalg.norm(direction)
+    return scale * (vectors @ (direction / np.sqrt(np.maximum(values, 1e-8))))
+
+
 def _race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch) -> list[Solution]:
     """Solve from every point, best first; one that ends at the noise floor needs no rivals."""
     floor = noise_level(program)
@@ -176,16 +212,16 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     """Return starts of the full model around the answer of the nested one.
 
     What the nested model does not have starts from the guess, and from several places in the range of speeds with
-    several shares of the Coulomb friction handed over to the Stribeck part.
+    Stribeck parts of several sizes.
     """
     known = dict(zip(simple.names, theta, strict=True))
     speed = float(np.max(model.speed_scale[:-1]))
     starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
-    handed_over = HANDED_OVER if any(".tau_s" in name for name in model.space.names) else HANDED_OVER[:1]
+    shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
     for place in RELEASES:
-        for share in handed_over:
+        for share in shares:
             values = [
-                _released_value(model.space, name, known, place * speed, share, starts[0][k])
+                _released_value(model.space, name, known, place, share, speed, starts[0][k])
                 for k, name in enumerate(model.space.names)
             ]
             starts.append(np.array(values))
@@ -193,20 +229,21 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
 
 
 def _released_value(
-    space: ParameterSpace, name: str, known: dict[str, float], speed: float, share: float, default: float
+    space: ParameterSpace, name: str, known: dict[str, float], place: float, share: float, speed: float, default: float
 ) -> float:
+    """Return a start that leaves the friction at the typical speed as the nested model has it."""
     stem, _, last = name.partition("@")[0].rpartition(".")
     if ".tau_s" in name:
         return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
     if name.endswith(".load.stribeck"):
-        return 2.0 * share * known.get(f"{stem}.coulomb", default)
+        return share * known.get(f"{stem}.coulomb", default)
     if name in known:
-        return (1.0 - share) * known[name] if _is_coulomb(name) else known[name]
+        return (1.0 - share * min(1.0, place)) * known[name] if _is_coulomb(name) else known[name]
     if ".omega_s" in name:
-        return speed
+        return place * speed
     if stem.endswith(".breaks"):
         breaks = sum(other.startswith(f"{stem}.") for other in space.names)
-        return 2.0 * speed * (int(last) + 1) / (breaks + 1)
+        return 2.0 * place * speed * (int(last) + 1) / (breaks + 1)
     if stem.endswith(".slopes"):
         return known.get(f"{stem}.0", default)
     return default

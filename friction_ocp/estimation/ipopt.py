@@ -81,7 +81,8 @@ def _solution(program: Program, end: Point, status: str, iterations: int, tolera
     system = program.linearise(end)
     step, predicted = trial_step(program.space, end, system, 1e-6)
     relative = predicted / max(system.objective, 1e-300)
-    if relative <= tolerances.stalled and status != "Maximum_Iterations_Exceeded":
+    small = relative <= tolerances.stalled or predicted <= tolerances.negligible
+    if small and status != "Maximum_Iterations_Exceeded":
         text = status if status in (SETTLED, SLOW) else "no step decreases the objective further"
         return Solution(end, system.objective, iterations, True, text)
     if status == "Maximum_Iterations_Exceeded":
@@ -154,7 +155,7 @@ class _Evaluations:
         margins = constraint_rows(self.program.space, point.theta)[0]
         if np.any(margins < -1e-8):
             return ""
-        if predicted <= self.tolerances.decrease * system.objective:
+        if predicted <= max(self.tolerances.decrease * system.objective, self.tolerances.negligible):
             return SETTLED
         latest = np.array(self._history[-4:])
         slow = latest.size == 4 and bool(np.all(np.abs(np.diff(latest)) <= self.tolerances.progress * latest[-1]))

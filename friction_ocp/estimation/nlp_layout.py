@@ -43,7 +43,7 @@ class NlpLayout:
             count += free
         theta = count + np.arange(point.theta.size)
         scale = np.ones(count + theta.size)
-        size = _state_size(point)
+        size = _state_size(point.nodes)
         for variables in index:
             scale[variables[variables >= 0]] = np.broadcast_to(size, variables.shape)[variables >= 0]
         scale[theta] = program.space.scale
@@ -72,9 +72,12 @@ class NlpLayout:
         return stacked[self.entries] * self.scale[row] * self.scale[column]
 
 
-def _state_size(point: Point) -> FloatArray:
-    spread = np.sqrt(np.mean(np.concatenate(point.nodes) ** 2, axis=0))
-    return np.where(spread > 0, spread, 1.0)
+def _state_size(nodes: Sequence[FloatArray]) -> FloatArray:
+    """Return the root mean square of each state; 1 where it is zero."""
+    if not nodes:
+        return np.ones(0)
+    size = np.sqrt(np.mean(np.concatenate(nodes) ** 2, axis=0))
+    return np.where(size > 0, size, 1.0)
 
 
 def _pattern(index: tuple[IntArray, ...], theta: IntArray) -> tuple[ca.Sparsity, IntArray]:

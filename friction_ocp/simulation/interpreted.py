@@ -65,7 +65,7 @@ class InterpretedKernel(AbstractKernel):
         self._delays = delay_indices(drive)
         self._states = len(drive.state_names)
         self._operation = cache(self._new_operation)
-        self._fold = cache(lambda length, derivatives: self._operation(derivatives).mapaccum("sweep", length))
+        self._fold = cache(self._new_fold)
         self._output = cache(self._new_output)
 
     def run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
@@ -126,6 +126,10 @@ class InterpretedKernel(AbstractKernel):
     def _new_output(self, delayed: bool, derivatives: bool) -> ca.Function:
         output = self._maps["output" if delayed else "now"]
         return output.solved(self._active if derivatives else None, OUTPUT_NEWTON_STEPS)
+
+    def _new_fold(self, length: int, derivatives: bool) -> ca.Function:
+        """Return (course, controls, p, width) -> course after each of `length` operations."""
+        return self._operation(derivatives).mapaccum("sweep", length)
 
     def _new_operation(self, derivatives: bool) -> ca.Function:
         """Return (course, control, p, width) -> course after a step or a tick, as the control's kind says."""

@@ -69,7 +69,7 @@ def test_two_masses_follow_the_plant(law: str) -> None:
 
 @pytest.mark.parametrize("law", ["dahl", "lugre"])
 def test_bristles_follow_the_plant_through_fast_motion(law: str) -> None:
-    """From 20 rad/s with a slack bristle, the deflection settles at once, reverses with the motion and does not ring."""
+    """From 20 rad/s with a slack bristle, the deflection settles at once, turns with the motion and does not ring."""
     twin = Twin(Plant((PlantShaft("motor", 0.01, LAWS[law]),), (), MOTOR), {"drive.current": reversals()})
     truth, run = twin.run(2.0, {"motor.omega": 20.0})
     error = np.abs(run["motor.friction.z"] - truth["motor.z"])

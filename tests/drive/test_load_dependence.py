@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plant import Plant, PlantFriction, PlantMotor, PlantShaft, PlantTransmission, Trajectory, reversing_steps
-from twin import Bench, Twin, drive_of, worst
+from twin import Bench, Twin, worst
 
 from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, Motor, Shaft, Transmission
 from friction_ocp.drive.stepping import stepped
@@ -38,7 +38,7 @@ def reversals() -> Trajectory:
 @pytest.mark.parametrize("ratio", [4.0, -4.0])
 @pytest.mark.parametrize("law", LOADED)
 def test_loaded_friction_follows_the_plant(law: str, ratio: float, stiffness: float) -> None:
-    """A geared load with gravity and friction that differs by direction moves as in the plant, for both senses of turn."""
+    """A geared load with gravity and friction that differs by direction moves as in the plant, for both signs."""
     load = PlantShaft("load", 0.4, PlantFriction("coulomb_viscous", tau_c=(0.3, 0.2), viscous=0.05), (0.5, 0.3))
     joint = PlantTransmission("motor", "load", ratio, stiffness, 3.0 if np.isfinite(stiffness) else 0.0)
     twin = Twin(Plant((PlantShaft("motor", 0.01, LOADED[law]), load), (joint,), MOTOR), {"drive.current": reversals()})
@@ -99,11 +99,31 @@ def test_load_dependence_needs_a_transmission() -> None:
         stepped(lone)
 
 
-def test_a_plant_and_a_drive_without_dry_friction_share_nothing() -> None:
+def test_shares_are_finite_without_dry_friction() -> None:
     """Where no shaft of a rigid group has dry friction the shares are finite and the load still counts."""
     friction = PlantFriction("viscous", viscous=0.01, load_viscous=0.02)
     shafts = (PlantShaft("motor", 0.01, friction), PlantShaft("load", 0.4, PlantFriction("viscous", viscous=0.05)))
     plant = Plant(shafts, (PlantTransmission("motor", "load", 4.0),), MOTOR)
     truth, run = Twin(plant, {"drive.current": reversals()}).run(1.0)
     assert worst(truth, run, "motor.theta", "motor.omega") < STEP_ERROR
-    assert drive_of(plant, {"drive.current": 0.0}).shaft("load").friction.load is None
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_geared_loads_follow_the_plant(seed: int) -> None:
+    """Whatever the shares, ratios and inertias, hoisting and lowering, the loaded gear moves as in the plant."""
+    rng = np.random.default_rng(seed)
+    shares = {name: rng.uniform(0.0, top) for name, top in (("coulomb", 0.3), ("stribeck", 0.2), ("viscous", 0.02))}
+    motor = PlantFriction(
+        "stribeck", rng.uniform(0.02, 0.2), 0.25, 2.0, viscous=0.01, **{f"load_{k}": v for k, v in shares.items()}
+    )
+    load = PlantFriction("stribeck", (rng.uniform(0.0, 0.5), rng.uniform(0.0, 0.5)), 0.6, 0.5, viscous=0.05)
+    shafts = (
+        PlantShaft("motor", rng.uniform(0.003, 0.02), motor, external_torque=rng.uniform(-0.2, 0.2)),
+        PlantShaft("load", rng.uniform(0.1, 1.0), load, (rng.uniform(0.5, 3.0), rng.uniform(-3.0, 3.0))),
+    )
+    joint = PlantTransmission("motor", "load", rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 8.0))
+    current = reversing_steps(np.array([0.2, 0.6, 1.5]), (0.05, 0.2), 1.0, rng)
+    twin = Twin(Plant(shafts, (joint,), MOTOR), {"drive.current": current})
+    truth, _ = twin.run(1.0)
+    finer = twin.bench.run(1.0, {"drive.current": current}, step=2.5e-4)
+    assert worst(truth, finer, "motor.theta", "motor.omega") < STEP_ERROR

@@ -43,7 +43,7 @@ def friction_of(friction: PlantFriction) -> FrictionElement:
         value = getattr(friction, "viscous" if name == "sigma2" else name)
         if name in ("slopes", "breaks"):
             numbers[name] = tuple(_by_direction(item) for item in value)
-        elif name == "omega_s" and friction.tau_s is None:
+        elif name == "omega_s" and friction.omega_s == 0.0:
             numbers[name] = 1.0
         else:
             numbers[name] = _by_direction(friction.tau_c if value is None else value)

@@ -1,0 +1,87 @@
+"""The lines of every piece of work are told, and honestly."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import acceptance
+import pytest
+import servo
+from checks import Check, status
+
+README = """
+```sh
+# a comment
+$ mkdir -p results/servo-identify && touch results/servo-identify/report.html
+
+python -c "import sys; sys.exit('/venv/' not in sys.executable)"
+```
+
+```python
+print("not a command")
+```
+"""
+
+
+def test_every_line_of_the_servo_has_its_measurement() -> None:
+    """IDs of lines and measurements are the same."""
+    assert list(acceptance.lines()["servo"]) == list(servo.MEASURES)
+
+
+@pytest.mark.parametrize("name", ["engine", "telescopes", "diagnosis", "users"])
+def test_lines_without_measurement_fail(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every line is printed as not measured, and the exit status is 1."""
+    assert acceptance.main([name]) == 1
+    text = capsys.readouterr().out
+    assert text.count("not measured yet") == len(acceptance.lines()[name])
+    assert f"0 of {len(acceptance.lines()[name])} lines hold" in text
+
+
+def test_no_line_is_chosen_by_an_unknown_id() -> None:
+    """Choosing nothing is no success."""
+    assert acceptance.main(["servo", "--only", "no such line"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("check", "word", "expected"),
+    [
+        (Check("a", "1", True), "ok", 0),
+        (Check("a", "1", False), "NO", 1),
+        (Check("a", "", None), "not measured", 1),
+        (Check("a", "", None, by_eye=True), "by eye", 0),
+    ],
+)
+def test_verdicts_decide_the_exit_status(check: Check, word: str, expected: int) -> None:
+    """Only what holds, or what a person judges, is no failure."""
+    assert check.verdict == word
+    assert status([Check("b", "", True), check]) == expected
+
+
+def test_commands_of_a_readme_are_its_shell_lines() -> None:
+    """Prompts and comments are no commands, and Python is none."""
+    first, second = servo.readme_commands(README)
+    assert first.startswith("mkdir -p results") and second.startswith("python -c")
+
+
+def test_bad_input_needs_at_least_one_test() -> None:
+    """A kind without a test fails, and so does one with a failing test."""
+    results = [("t.py::a[x]", "PASSED"), ("t.py::a[y]", "FAILED")]
+    assert [servo.bad_input_check("kind", part, results).passed for part in ("[x]", "[y]", "[z]")] == [
+        True,
+        False,
+        False,
+    ]
+
+
+@pytest.mark.slow
+def test_readme_is_followed_in_a_fresh_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both commands run in the clone, inside the new environment."""
+    (tmp_path / "README.md").write_text(README)
+    identity = ["-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for arguments in (["init", "--quiet"], ["add", "."], [*identity, "commit", "--quiet", "-m", "README"]):
+        subprocess.run(["git", *arguments], cwd=tmp_path, check=True)
+    monkeypatch.setattr(servo, "ROOT", tmp_path)
+    check = servo.follow_readme("line", quick=False)
+    assert check.passed, check.measured
+    assert "results/servo-identify/report.html" in check.measured

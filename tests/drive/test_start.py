@@ -1,0 +1,52 @@
+"""The state that measured motion suggests."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft
+from twin import Bench, drive_of
+
+from friction_ocp.drive.parts import Channel, Drive, Shaft, Transmission
+
+ROUNDING = 1e-12
+
+
+def started(bench: Bench, measured: dict[str, float], rates: dict[str, float], inputs: list[float]) -> dict[str, float]:
+    """Return the start state by name."""
+    y, dy = ([values.get(name, 0.0) for name in bench.stepped.output_names] for values in (measured, rates))
+    state = np.asarray(bench.stepped.start(y, dy, inputs, bench.numbers)).ravel()
+    return dict(zip(bench.stepped.state_names, state, strict=True))
+
+
+def test_one_channel_suggests_the_whole_chain() -> None:
+    """An angle channel gives angle and speed of its shaft, and through the ratios, untwisted, of all others."""
+    channel = Channel("encoder", "middle.theta", gain=2.0, offset=0.5)
+    shafts = tuple(Shaft(name, 0.1) for name in ("motor", "middle", "load"))
+    joints = (Transmission("motor", "middle", -4.0), Transmission("middle", "load", 3.0, 100.0))
+    bench = Bench(Drive(shafts, joints, channels=(channel,)))
+    state = started(bench, {"encoder": 2.5}, {"encoder": 6.0}, [])
+    assert state == pytest.approx(
+        {"motor.theta": -4.0, "load.theta": 1.0 / 3.0, "motor.omega": -12.0, "load.omega": 1.0}, rel=ROUNDING
+    )
+
+
+@pytest.mark.parametrize("omega", [30.0, -30.0])
+def test_bristles_start_in_steady_motion(omega: float) -> None:
+    """Well above the Stribeck speed a bristle starts at the deflection of its level in that direction."""
+    friction = PlantFriction("lugre", (0.1, 0.12), 0.15, 1.0, sigma0=(200.0, 100.0))
+    plant = Plant((PlantShaft("motor", 0.01, friction),), (), (PlantMotor("drive", "motor"),))
+    state = started(Bench(drive_of(plant, {"drive.current": 0.0})), {}, {"motor.theta": omega}, [0.0])
+    rounded_sign = 1e-5
+    assert state["motor.friction.z"] == pytest.approx(0.1 / 200.0 if omega > 0 else -0.12 / 100.0, rel=rounded_sign)
+
+
+def test_a_sampled_controller_starts_with_the_samples_of_steady_motion() -> None:
+    """The angles of the two ticks before are those of uniform motion, seen through the feedback channel."""
+    loop = PlantController("loop", "pd", "seen", kp=2.0, kd=0.1, sample_time=0.01)
+    motor = PlantMotor("drive", "motor", "torque", controller="loop")
+    sensor = PlantSensor("seen", "motor.theta", gain=2.0, offset=0.5)
+    plant = Plant((PlantShaft("motor", 0.01),), (), (motor,), (loop,), (sensor,))
+    measured, rates = {"seen": 1.5, "motor.theta": 0.5, "motor.omega": 2.0}, {"seen": 4.0, "motor.theta": 2.0}
+    state = started(Bench(drive_of(plant, {"reference.theta": 0.0})), measured, rates, [0.0])
+    assert [state[f"controller.previous{k}"] for k in (1, 2)] == pytest.approx([1.46, 1.42], rel=ROUNDING)

@@ -1,0 +1,71 @@
+"""Gauss-Newton on programs with known answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from smooth_programs import offset_rosenbrock, rosenbrock, toy
+
+from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+
+TIGHT = Tolerances(decrease=1e-12, negligible=0.0)
+
+
+def test_finds_the_end_of_a_bent_valley() -> None:
+    """Rosenbrock's valley is followed to its end."""
+    program: Any = toy(rosenbrock, (-1.2, 1.0))
+    solution = solve_gauss_newton(program, program.start, TIGHT)
+    assert solution.converged
+    assert solution.point.theta == pytest.approx([1.0, 1.0], abs=1e-5)
+
+
+def test_stops_at_a_bound() -> None:
+    """With theta <= 0.5 the minimum lies on the bound, where theta1 = theta0^2."""
+    program: Any = toy(offset_rosenbrock, (-1.2, 1.0), -2.0, 0.5)
+    solution = solve_gauss_newton(program, program.start, TIGHT)
+    assert solution.converged
+    assert solution.point.theta == pytest.approx([0.5, 0.25], abs=1e-5)
+
+
+def test_starts_inside_the_bounds() -> None:
+    """A start outside is moved to the nearest bound first."""
+    program: Any = toy(rosenbrock, (5.0, 5.0), -2.0, 2.0)
+    seen: list[np.ndarray] = []
+    solve_gauss_newton(program, program.start, watch=lambda k, f, point: seen.append(point.theta))
+    assert all(np.all(np.abs(theta) <= 2.0) for theta in seen)
+
+
+def test_keeps_a_constraint() -> None:
+    """On theta0 + theta1 <= 1 the answer solves theta0 + theta0^2 = 1 up to the pull of the first residual."""
+    program: Any = toy(rosenbrock, (-1.2, 1.0), constraint=lambda theta: 1 - theta[0] - theta[1])
+    solution = solve_gauss_newton(program, program.start, TIGHT)
+    assert solution.converged
+    assert np.sum(solution.point.theta) == pytest.approx(1.0, abs=1e-8)
+    assert solution.point.theta[0] == pytest.approx(0.618, abs=2e-3)
+
+
+def test_objective_never_rises() -> None:
+    """Every accepted step decreases the objective."""
+    program: Any = toy(rosenbrock, (-1.2, 1.0))
+    objectives: list[float] = []
+    solve_gauss_newton(program, program.start, watch=lambda k, f, point: objectives.append(f))
+    assert np.all(np.diff(objectives) < 0)
+
+
+def test_iteration_limit_is_not_convergence() -> None:
+    """A solver that was cut short says so."""
+    program: Any = toy(rosenbrock, (-1.2, 1.0))
+    solution = solve_gauss_newton(program, program.start, Tolerances(max_iterations=2))
+    assert not solution.converged
+    assert "iteration limit" in solution.message
+
+
+def test_breakdown_at_the_start_is_reported() -> None:
+    """Where the first evaluation is not finite there is no answer."""
+    program: Any = toy(lambda theta: ca.log(theta), (-1.0,))
+    solution = solve_gauss_newton(program, program.start)
+    assert not solution.converged
+    assert "breaks down" in solution.message
