@@ -1,4 +1,4 @@
-"""What holds for all tests: this folder is importable, and no test changes how signals are handled."""
+"""What holds for all tests: this folder is importable, examples are the same in every run, signals stay as they are."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import signal
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("steady", deadline=None, derandomize=True)
+settings.load_profile("steady")
 
 
 @pytest.fixture(autouse=True)

@@ -174,11 +174,12 @@ def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX)
 
 
 def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> tuple[Any, Any, Any]:
-    if channel.part in mech.topology.group_of:
+    if channel.signal in ("theta", "omega", "alpha"):
         omega = mech.shaft_speed(channel.part, at.v)
         alpha = mech.shaft_speed(channel.part, acceleration)
-        signals = {"theta": (mech.shaft_angle(channel.part, at), omega, alpha), "omega": (omega, alpha, 0.0)}
-        return signals.get(channel.signal, (alpha, 0.0, 0.0))
+        theta = mech.shaft_angle(channel.part, at)
+        signals = {"theta": (theta, omega, alpha), "omega": (omega, alpha, 0.0), "alpha": (alpha, 0.0, 0.0)}
+        return signals[channel.signal]
     motor = mech.drive.motor(channel.part)
     value = {
         "current": mech.motor_current,

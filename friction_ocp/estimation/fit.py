@@ -36,8 +36,8 @@ RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
 SHARES = (0.3, 1.0)
 """Stribeck parts over the Coulomb friction from which the released parameters start."""
-NOISE_SPREAD = 5.0
-"""Standard deviations of the chi-square of pure noise within which a fit counts as being at the noise floor."""
+AT_NOISE = 1.5
+"""Mean square error over the noise floor up to which a fit needs no rivals."""
 HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks: by what share the quadratic model calls them worse."""
 FINALISTS = 5
@@ -62,14 +62,18 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     """
     phases, span = Phases(progress, EXPECTED_PHASES), horizon(model)
     held = is_held(model.problem.drive)
-    first = Plan(windowed(span), WIDTHS) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:])
+    stated = bool(model.problem.estimation.process_noise)
+    first = (
+        Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
+    )
     fitted = _hop(model, _staged(model, first, phases), phases)
     if held or not fits_free_run(model):
         return fitted
     for share in GROWTH:
         grown = windowed(_longest(model, span) * share)
         program = grown(model, 0.0, fitted.program.loss)
-        solution = _solve(program, _carried(fitted, program), FINE, f"free run over {share:.0%} of the horizon", phases)
+        watch = phases.begin(f"free run over {share:.0%} of the horizon")
+        solution = final_solver(model)(program, _carried(fitted, program), _limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     return fitted
 
@@ -80,9 +84,12 @@ class Plan:
 
     builder: Builder
     widths: tuple[float, ...]
+    conclusive: bool
+    """Whether small residuals prove the parameters right: gaps of an assumed size between segments hide errors."""
 
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
+Solve = Callable[[Program, Point, Tolerances, Watch], Solution]
 
 
 def joined(model: Model, width: float, loss: AbstractLoss) -> Program:
@@ -117,29 +124,42 @@ def _carried(fitted: Fitted, program: Program) -> Point:
 
 
 def _staged(model: Model, plan: Plan, phases: Phases) -> Fitted:
-    """Fit the simpler model first, if there is one, and the full model from several releases of what it leaves out."""
+    """Fit from the starts at hand; where none ends at the noise floor and there is a simpler model, fit that first.
+
+    The full model then starts from several releases of what the simpler one leaves out.
+    """
     simple = nested_space(model.problem, model.space)
+    plain = _plain_starts(model, phases)
     if simple is model.space:
-        return _rounds(model, plan, _plain_starts(model, phases), "fit", phases)
+        return _rounds(model, plan, plain, "fit", phases)
+    exact = replace(plan, widths=RELEASED_WIDTHS)
+    if plan.conclusive and model.problem.estimation.loss == "squares":
+        direct = _rounds(model, exact, plain[1:], "direct fit", phases)
+        if _at_noise(direct.program, direct.solution):
+            return direct
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
-    starts = released(model, simple, nested.solution.point.theta)
-    return _rounds(model, replace(plan, widths=RELEASED_WIDTHS), starts, "fit", phases)
+    return _rounds(model, exact, released(model, simple, nested.solution.point.theta), "fit", phases)
 
 
 def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
     return [model.space.guess, _predicted(model, phases)]
 
 
-def _solve(program: Program, point: Point, tolerances: Tolerances, phase: str, phases: Phases) -> Solution:
-    return solve_gauss_newton(program, point, tolerances, phases.begin(phase))
+def final_solver(model: Model) -> Solve:
+    """Return what solves the programs of a fit: the structured solver, or Ipopt where the problem asks for it."""
+    if model.problem.estimation.solver == "gauss_newton":
+        return solve_gauss_newton
+    from friction_ocp.estimation.ipopt import solve_ipopt
+
+    return solve_ipopt
 
 
 def _predicted(model: Model, phases: Phases) -> FloatArray:
     """Return the parameters that best predict the smoothed motion over short times."""
     program = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
-    return _solve(program, start, COARSE, "short predictions", phases).point.theta
+    return solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")).point.theta
 
 
 def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> Fitted:
@@ -152,8 +172,11 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     for k in range(rounds):
         program = plan.builder(model, plan.widths[min(k, len(plan.widths) - 1)], Squares())
         program = replace(program, loss=loss_of_round(model, program, points[0], k))
-        limits = replace(FINE, max_iterations=model.problem.estimation.max_iterations) if k == rounds - 1 else COARSE
-        ends = _race(program, points, limits, phases.begin(f"{name}, round {k + 1} of {rounds}"))
+        watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
+        last = k == rounds - 1
+        ends = _race(program, points, _limits(model) if last else COARSE, watch, final_solver(model))
+        if plan.conclusive and _at_noise(program, ends[0]):
+            ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
         iterations += sum(end.iterations for end in ends)
     return Fitted(replace(ends[0], iterations=iterations), program)
@@ -188,24 +211,23 @@ def _on_ellipsoid(hessian: FloatArray, size: float, rng: np.random.Generator) ->
     return scale * (vectors @ (direction / np.sqrt(np.maximum(values, 1e-8))))
 
 
-def _race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch) -> list[Solution]:
-    """Solve from every point, best first; one that ends at the noise floor needs no rivals."""
-    floor = noise_level(program)
-    ends: list[Solution] = []
-    for point in points:
-        end = solve_gauss_newton(program, point, limits, watch)
-        if end.objective <= floor:
-            return [end]
-        ends.append(end)
-    return sorted(ends, key=lambda end: end.objective)
+def _limits(model: Model) -> Tolerances:
+    return replace(FINE, max_iterations=model.problem.estimation.max_iterations)
 
 
-def noise_level(program: Program) -> float:
-    """Return the objective that noise alone would rarely exceed, 0 for losses other than squares."""
+def _race(
+    program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve
+) -> list[Solution]:
+    """Solve from every point and return the ends, best first."""
+    return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
+
+
+def _at_noise(program: Program, end: Solution) -> bool:
+    """Whether a fit by squares ends so close to the noise that no rival could be much better."""
     if not isinstance(program.loss, Squares):
-        return 0.0
+        return False
     samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
-    return 0.5 * samples * (1.0 + NOISE_SPREAD * float(np.sqrt(2.0 / samples)))
+    return end.objective <= 0.5 * samples * AT_NOISE
 
 
 def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:

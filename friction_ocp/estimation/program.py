@@ -16,7 +16,8 @@ from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.simulation.grid import FloatArray, IntArray
-from friction_ocp.simulation.sweep import Sweep, SweepResult
+from friction_ocp.simulation.kernel import SweepRequest, SweepResult
+from friction_ocp.simulation.sweep import Sweep
 
 
 @dataclass(frozen=True)
@@ -115,13 +116,20 @@ class Program:
 
     def simulate(self, index: int, point: Point, derivatives: bool = False, with_states: bool = False) -> SweepResult:
         """Simulate the segments of one recording from their nodes."""
+        return self.sweep.run_many([self._request(index, point, derivatives, with_states)])[0]
+
+    def simulate_all(self, point: Point, derivatives: bool = False) -> list[SweepResult]:
+        """Simulate all recordings, side by side."""
+        return self.sweep.run_many([self._request(k, point, derivatives) for k in range(len(self.experiments))])
+
+    def _request(self, index: int, point: Point, derivatives: bool, with_states: bool = False) -> SweepRequest:
         item, cut = self.experiments[index], self.segments[index]
         nodes = point.nodes[index]
         if cut.measured:
             nodes = nodes.copy()
             nodes[: cut.measured] = self.measured_states(item, point.theta, cut.first[: cut.measured])[0]
         numbers = self.space.numbers(point.theta, item.name)
-        return self.sweep.run(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
+        return SweepRequest(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
 
     def residuals(self, index: int, y: FloatArray) -> FloatArray:
         """Return (n, outputs) errors over the noise floor, NaN where there is no sample."""
@@ -130,8 +138,9 @@ class Program:
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
         total = _prior_cost(self.space, point.theta)
+        results = self.simulate_all(point)
         for index, (item, cut) in enumerate(zip(self.experiments, self.segments, strict=True)):
-            result = self.simulate(index, point)
+            result = results[index]
             errors = self.residuals(index, result.y)
             cost = self.loss.cost(errors[np.isfinite(item.measured)])
             total += float(np.sum(cost)) + self._gap_cost(cut, point.nodes[index], result.end)
@@ -162,17 +171,18 @@ class Program:
         hessian += np.diag(pull)
         gradient += pull * (point.theta - self.space.prior_mean)
         blocks: list[Blocks] = []
-        for index in range(len(self.experiments)):
-            cost, by_theta, slope, block = self._linearise_recording(index, point)
+        for index, result in enumerate(self.simulate_all(point, derivatives=True)):
+            cost, by_theta, slope, block = self._linearise_recording(index, point, result)
             total += cost
             hessian += by_theta
             gradient += slope
             blocks.append(block)
         return Linearisation(total if np.isfinite(total) else np.inf, hessian, gradient, tuple(blocks))
 
-    def _linearise_recording(self, index: int, point: Point) -> tuple[float, FloatArray, FloatArray, Blocks]:
+    def _linearise_recording(
+        self, index: int, point: Point, result: SweepResult
+    ) -> tuple[float, FloatArray, FloatArray, Blocks]:
         cut, nodes = self.segments[index], point.nodes[index]
-        result = self.simulate(index, point, derivatives=True)
         assert result.dy is not None and result.dend is not None
         _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
         states, count = nodes.shape[1], point.theta.size

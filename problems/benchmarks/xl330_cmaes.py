@@ -82,11 +82,49 @@ class FreeRunError:
 
 @dataclass(frozen=True)
 class Job:
-    """One run of CMA-ES."""
+    """One seed of CMA-ES."""
 
     problem: Path
     seed: int
     evaluations: int
+
+
+class Objective:
+    """The free-run error in coordinates of the bounds; remembers the best point and when it came."""
+
+    def __init__(self, model: Model) -> None:
+        self.box = ParameterBox(model.space)
+        self.error = FreeRunError.over(model, model.train)
+        self.best, self.best_theta = np.inf, model.space.guess
+        self.evaluations, self.best_at = 0, 0
+
+    def __call__(self, unit: FloatArray) -> float:
+        """Return the error of the nearest point that obeys the constraints, plus the squared way to it."""
+        theta = self.box.repaired(self.box.from_unit(np.asarray(unit)))
+        value = self.error(theta)
+        self.evaluations += 1
+        if value < self.best - EQUAL:
+            self.best_at = self.evaluations
+        if value < self.best:
+            self.best, self.best_theta = value, theta
+        moved = float(np.sum((self.box.to_unit(theta) - unit) ** 2))
+        return value + moved if np.isfinite(value) else BROKEN
+
+
+def search(objective: Objective, job: Job) -> None:
+    """Spend all evaluations: first from the guess, then, where CMA-ES stops before, from random points.
+
+    Each restart doubles the population (Auger & Hansen 2005).
+    """
+    rng = np.random.default_rng(job.seed)
+    start, population = objective.box.to_unit(objective.best_theta), 4 + int(3 * np.log(objective.best_theta.size))
+    while (left := job.evaluations - objective.evaluations) >= population:
+        options = {"bounds": [0, 1], "maxfevals": left, "seed": job.seed, "verbose": -9, "popsize": population}
+        strategy: Any = cma.CMAEvolutionStrategy(start, SPREAD, options)
+        while not strategy.stop():
+            points = strategy.ask()
+            strategy.tell(points, [objective(point) for point in points])
+        start, population = rng.uniform(0.0, 1.0, start.size), 2 * population
 
 
 def run_cmaes(job: Job) -> Outcome:
@@ -94,27 +132,13 @@ def run_cmaes(job: Job) -> Outcome:
     os.environ["FRICTION_OCP_THREADS"] = "1"
     began = time.perf_counter()
     model = prepare(load_problem(job.problem))
-    box, error = ParameterBox(model.space), FreeRunError.over(model, model.train)
-    best, best_theta = np.inf, model.space.guess
-
-    def objective(unit: FloatArray) -> float:
-        nonlocal best, best_theta
-        theta = box.repaired(box.from_unit(np.asarray(unit)))
-        value = error(theta)
-        if value < best:
-            best, best_theta = value, theta
-        moved = float(np.sum((box.to_unit(theta) - unit) ** 2))
-        return value + moved if np.isfinite(value) else BROKEN
-
-    options = {"bounds": [0, 1], "maxfevals": job.evaluations, "seed": job.seed, "verbose": -9}
-    search: Any = cma.CMAEvolutionStrategy(box.to_unit(model.space.guess), SPREAD, options)
-    while not search.stop():
-        points = search.ask()
-        search.tell(points, [objective(point) for point in points])
+    objective = Objective(model)
+    search(objective, job)
     seconds = time.perf_counter() - began
-    validation = FreeRunError.over(model, model.validation)(best_theta)
-    evaluations = str(search.result.evaluations)
-    return Outcome("CMA-ES", best, validation, seconds, evaluations, _named(model, best_theta))
+    theta = objective.best_theta
+    validation = FreeRunError.over(model, model.validation)(theta)
+    evaluations = f"{objective.evaluations} (best at {objective.best_at})"
+    return Outcome("CMA-ES", objective.best, validation, seconds, evaluations, _named(model, theta))
 
 
 def best_of_seeds(problem: Path, evaluations: int, pool: ProcessPoolExecutor) -> Outcome:

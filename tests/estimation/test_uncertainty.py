@@ -1,0 +1,128 @@
+"""Covariances against the closed forms of linear regression."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.stats
+from regressions import autoregressive, regression, space
+
+from friction_ocp.estimation.uncertainty import Uncertainty, at_bounds, uncertainty
+
+ROUNDING = 1e-9
+SCATTER = 0.2
+"""Relative error of the mean of a robust variance over the draws below."""
+
+
+def design(rows: int) -> np.ndarray:
+    """Return a regressor of slow, faster and no change."""
+    t = np.linspace(0.0, 1.0, rows)
+    return np.column_stack([np.sin(2 * np.pi * t), np.cos(10 * np.pi * t), np.ones(rows)])
+
+
+def judged(
+    x: np.ndarray, noise: np.ndarray, white: bool, prior_std: np.ndarray | float = np.inf, recordings: int = 1
+) -> Uncertainty:
+    """Return the uncertainty of a regression whose parameters are well inside their bounds."""
+    found = regression(x, noise, prior_std=prior_std, recordings=recordings)
+    return uncertainty(space(np.ones(x.shape[1]), -10, 10, prior_std), np.ones(x.shape[1]), found, white, False)
+
+
+def test_white_residuals_give_the_covariance_of_regression() -> None:
+    """It is (X'X)^-1 where residuals are in units of their noise, and intervals are normal."""
+    x = design(300)
+    found = judged(x, np.random.default_rng(1).standard_normal(300), white=True)
+    assert found.kind == "gauss_newton"
+    assert found.covariance == pytest.approx(np.linalg.inv(x.T @ x), rel=ROUNDING)
+    reach = scipy.stats.norm.ppf(0.975) * found.std_error
+    assert found.interval(np.ones(3)) == pytest.approx(np.column_stack([1 - reach, 1 + reach]), rel=1e-6)
+
+
+def test_a_prior_adds_its_information() -> None:
+    """The inverse covariances of data and prior add up."""
+    x, stds = design(300), np.array([0.05, np.inf, 0.1])
+    found = judged(x, np.zeros(300), white=True, prior_std=stds)
+    assert found.covariance == pytest.approx(np.linalg.inv(x.T @ x + np.diag(stds**-2.0)), rel=ROUNDING)
+
+
+def test_correlation_is_the_scaled_covariance() -> None:
+    """Its diagonal is one, and two regressors that resemble each other have parameters that oppose each other."""
+    x = design(300)
+    x[:, 2] = x[:, 0] + 0.1 * x[:, 1]
+    found = judged(x, np.zeros(300), white=True)
+    assert np.diag(found.correlation) == pytest.approx(1.0)
+    assert found.correlation[0, 2] == pytest.approx(-1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("recordings", [1, 4])
+def test_the_sandwich_knows_correlated_noise(recordings: int) -> None:
+    """Under autoregressive noise its mean over draws is the exact variance, which (X'X)^-1 is far from."""
+    rows, phi, draws = 4000, 0.8, 60
+    x, rng = design(rows), np.random.default_rng(2)
+    parts = rows // recordings
+    spread = [scipy.linalg.matmul_toeplitz(phi ** np.arange(parts), part) for part in np.split(x, recordings)]
+    inverse = np.linalg.inv(x.T @ x)
+    exact = np.diag(inverse @ x.T @ np.concatenate(spread) @ inverse)
+    noises = [np.concatenate([autoregressive(phi, parts, rng) for _ in range(recordings)]) for _ in range(draws)]
+    fits = [noise - x @ (inverse @ (x.T @ noise)) for noise in noises]
+    mean = np.mean([np.diag(judged(x, fit, False, recordings=recordings).covariance) for fit in fits], axis=0)
+    assert mean == pytest.approx(exact, rel=SCATTER)
+    assert np.all(exact > 5.0 * np.diag(inverse))
+
+
+def test_the_sandwich_agrees_where_noise_is_white() -> None:
+    """It costs only scatter to use it without need."""
+    x, rng = design(2000), np.random.default_rng(3)
+    mean = np.mean([np.diag(judged(x, rng.standard_normal(2000), False).covariance) for _ in range(60)], axis=0)
+    assert mean == pytest.approx(np.diag(np.linalg.inv(x.T @ x)), rel=SCATTER)
+
+
+def test_robust_intervals_are_those_of_students_t() -> None:
+    """They are wider than normal ones by the number of blocks behind the variance."""
+    found = judged(design(2000), np.random.default_rng(4).standard_normal(2000), white=False)
+    assert found.kind == "sandwich"
+    assert 20 < found.freedom < 200
+    low, high = found.interval(np.ones(3)).T
+    assert (high - low) / found.std_error == pytest.approx(2.0 * scipy.stats.t.ppf(0.975, found.freedom))
+
+
+def test_a_parameter_at_its_bound_is_held_and_has_no_error() -> None:
+    """The others have the covariance of a regression without it."""
+    x, theta = design(300), np.array([0.0, 1.0, 2.0])
+    found = uncertainty(space(theta, 0.0, 10.0), theta, regression(x, np.zeros(300)), True, False)
+    assert found.at_bound.tolist() == [True, False, False]
+    assert np.all(np.isnan(found.covariance[0])) and np.all(np.isnan(found.covariance[:, 0]))
+    assert found.covariance[1:, 1:] == pytest.approx(np.linalg.inv(x[:, 1:].T @ x[:, 1:]), rel=ROUNDING)
+
+
+def test_bounds_are_reached_within_rounding_of_their_span() -> None:
+    """Upper, lower and absent bounds."""
+    theta = np.array([0.0, 1e-7, 1e-3, 1.0, 5.0])
+    bounded = space(theta, np.array([0, 0, 0, 0, -np.inf]), np.array([1, 1, 1, 1, np.inf]))
+    assert at_bounds(bounded, theta).tolist() == [True, True, False, True, False]
+
+
+def test_a_direction_without_information_is_vague_not_undefined() -> None:
+    """Parameters that act only as a sum, or not at all, get a huge standard error; their sum a small one."""
+    x = design(300)
+    x[:, 1] = x[:, 0]
+    x[:, 2] = 0.0
+    found = judged(x, np.zeros(300), white=True)
+    assert np.all(np.isfinite(found.covariance))
+    assert np.all(found.std_error > 1e4)
+    sum_variance = found.covariance[:2, :2].sum()
+    assert sum_variance == pytest.approx(1.0 / float(x[:, 0] @ x[:, 0]), rel=0.1)
+
+
+def test_the_absolute_loss_has_the_covariance_of_least_absolute_deviations() -> None:
+    """For Laplace noise of scale s it is s^2 (X'X)^-1, whatever the noise floor (Bassett & Koenker 1978)."""
+    rows, scale, rng = 3000, 4.0, np.random.default_rng(5)
+    x, theta = design(rows), np.ones(3)
+    inside, variances = space(theta, -10, 10), []
+    for _ in range(40):
+        noise = rng.laplace(scale=scale, size=rows)
+        variances.append(
+            np.diag(uncertainty(inside, theta, regression(x, noise, np.sign(noise)), True, True).covariance)
+        )
+    assert np.mean(variances, axis=0) == pytest.approx(scale**2 * np.diag(np.linalg.inv(x.T @ x)), rel=2 * SCATTER)
