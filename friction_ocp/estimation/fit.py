@@ -30,7 +30,7 @@ from friction_ocp.simulation.grid import FloatArray
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()
 EXPECTED_PHASES = 16
-GROWTH = (0.1, 0.3, 1.0)
+GROWTH = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Windows of a free run over its horizon, one after another, for a drive that drifts."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""

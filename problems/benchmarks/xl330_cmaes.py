@@ -4,8 +4,9 @@ python problems/benchmarks/xl330_cmaes.py [MODEL ...] [--evaluations 10000] [--q
 
 Both minimise the mean absolute position error of the free run over the training recordings, with the same compiled
 simulator, start, bounds and constraints; `identify` rounds |error| off below a hundredth of its mean. CMA-ES is the
-better of two seeds, run side by side, one processor each; `identify` simulates on both. Code generation and
-compilation, which both need once, are done beforehand and printed.
+better of two seeds, run side by side, one processor each, with restarts until all evaluations are spent ("best at" is
+the last one that gained more than 1e-6 rad); `identify` simulates on both. Code generation and compilation, which both
+need once, are done beforehand and printed.
 """
 
 from __future__ import annotations
