@@ -82,7 +82,10 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
             numbers = model.space.numbers(theta, run.name)
             sizes = function.map(run.time.size)(run.states[:, : q.numel()].T, item.grid.at_node.T, numbers)
             largest = max(largest, float(np.quantile(np.asarray(sizes), 0.95)))
-    return [0.0, 0.5 * largest, largest] if largest > 0 else [0.0]
+    if largest <= 0:
+        return [0.0]
+    shown = float(f"{largest:.2g}")
+    return [0.0, 0.5 * shown, shown]
 
 
 def _gravity(mech: Mechanism, name: str, at: Motion) -> ca.SX:
@@ -96,12 +99,8 @@ def _curve(
     omega = ca.SX.sym("omega")  # pyright: ignore[reportArgumentType]
     parameters = ca.vertcat(*model.drive.mechanism.parameters.values())
     element = shaft.friction
-    speed, (positive, negative) = (
-        smooth_abs(omega),
-        (element.magnitude(side, smooth_abs(omega), load) for side in ("positive", "negative")),
-    )
+    positive, negative = (element.magnitude(side, smooth_abs(omega), load) for side in ("positive", "negative"))
     torque = ca.if_else(omega >= 0, positive, -negative)
-    del speed
     active = ca.vertcat(*[parameters[k] for k in model.space.active])
     function = ca.Function("curve", [omega, parameters], [torque, ca.densify(ca.jacobian(torque, active))])
     grid = np.linspace(-fastest, fastest, POINTS + 1)

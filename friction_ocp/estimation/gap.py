@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from friction_ocp.estimation.experiment import Experiment
@@ -30,11 +31,11 @@ def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
     """
     mech = model.drive.mechanism
     covariance = np.diag((DETERMINISTIC_GAP * model.state_scale) ** 2)
-    densities, inertias = _densities(model), _inertias(model, item)
+    noise = _group_noise(model, item)
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):
         v, q = len(mech.angle_groups) + k, position[group]
-        power = (densities[group] / inertias[group]) ** 2 * span
+        power = noise[group] ** 2 * span
         covariance[v, v] += power
         covariance[q, q] += power * span**2 / 3.0
         covariance[q, v] += power * span / 2.0
@@ -42,20 +43,12 @@ def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
     return covariance
 
 
-def _densities(model: Model) -> FloatArray:
-    """Return the torque noise of each group, referred to its first shaft."""
+def _group_noise(model: Model, item: Experiment) -> FloatArray:
+    """Return the density of the acceleration noise of each group, referred to its first shaft, rad/s^2/sqrt(Hz)."""
     mech = model.drive.mechanism
-    total = np.zeros(len(mech.topology.roots))
+    power = [ca.SX(0.0) for _ in mech.topology.roots]
     for shaft, density in model.problem.estimation.process_noise.items():
-        total[mech.topology.group_of[shaft]] += density**2
-    return np.sqrt(total)
-
-
-def _inertias(model: Model, item: Experiment) -> FloatArray:
-    import casadi as ca
-
-    mech = model.drive.mechanism
-    symbols = ca.vertcat(*mech.parameters.values())
-    values = [ca.SX(mech.inertia(group)) for group in range(len(mech.topology.roots))]
-    function = ca.Function("inertia", [symbols], [ca.vertcat(*values)])
+        power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
+    spread = [ca.sqrt(power[group]) / mech.inertia(group) for group in range(len(power))]
+    function = ca.Function("noise", [ca.vertcat(*mech.parameters.values())], [ca.vertcat(*spread)])
     return np.asarray(function(model.space.numbers(model.space.guess, item.name))).ravel()

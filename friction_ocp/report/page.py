@@ -47,7 +47,8 @@ def render_report(result: Json, series: Series) -> str:
     return render_page(
         "identify.html",
         {
-            **{key: str(result.get(key) or "") for key in ("title", "question", "problem", "message")},
+            **{key: str(result.get(key) or "") for key in ("title", "problem", "message")},
+            "question": paragraphs(str(result.get("question") or "")),
             "converged": result.get("status") == "converged",
             "verdict": verdict_sentence(result),
             "warnings": rows(result, "warnings"),
@@ -66,6 +67,11 @@ def render_report(result: Json, series: Series) -> str:
             "checksums": checksums,
         },
     )
+
+
+def paragraphs(text: str) -> list[str]:
+    """Return the paragraphs of plain text, the line breaks within each dropped."""
+    return [" ".join(block.split()) for block in text.split("\n\n") if block.strip()]
 
 
 def render_page(template: str, context: Mapping[str, Any]) -> str:

@@ -161,7 +161,8 @@ def run_problem(problem: Path, starts: int, seed: int, pool: ProcessPoolExecutor
     for number, end in enumerate(ends):
         excess = end.objective / summary.best - 1.0
         if excess > SAME_OBJECTIVE or not end.converged:
-            print(f"{summary.problem}, start {number}: {100 * excess:.2f} % above the best; {end.message}", flush=True)
+            print(f"{summary.problem}, start {number}: {100 * excess:.2f} % above the best; {end.message}")
+    print(f"{summary.problem}: {measured(summary)}", flush=True)
     return summary
 
 

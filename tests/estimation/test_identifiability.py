@@ -27,8 +27,9 @@ def judge(
     lower: np.ndarray | float = -100.0,
     upper: np.ndarray | float = 100.0,
     prior_std: np.ndarray | float = np.inf,
+    white: bool = True,
 ) -> tuple[Verdict, ...]:
-    """Return the verdicts on a regression with white residuals."""
+    """Return the verdicts on a regression."""
     bounds = space(theta, lower, upper, prior_std)
     return verdicts(
         bounds, theta, uncertainty(bounds, theta, regression(x, np.zeros(ROWS), prior_std=prior_std), True, False)

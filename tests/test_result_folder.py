@@ -1,0 +1,184 @@
+"""What is written: every file whole or not at all, and its content as the interface states it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+from servo_problem import servo_document, write_problem, write_servo
+
+from friction_ocp.estimation.estimate import Estimate, Simulation, identify, simulate
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_result_series
+from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
+from friction_ocp.result_folder import fitted_problem, plain_arrays, write_whole
+
+QUESTION = "how stiff the grease is."
+RESULT: dict[str, Any] = {
+    "format": str,
+    "status": str,
+    "message": str,
+    "title": str,
+    "warnings": list,
+    "parameters": {
+        "servo.friction.tau_c": {
+            "value": float,
+            "unit": str,
+            "std_error": (float, type(None)),
+            "interval95": (list, type(None)),
+            "guess": float,
+            "verdict": str,
+            "traded_with": list,
+        }
+    },
+    "fit": {
+        "horizon_s": (float, type(None)),
+        "train": {
+            "position": {
+                "rms": float,
+                "mae": float,
+                "unit": str,
+                "relative": float,
+                "relative_norm": float,
+                "noise_ratio": float,
+                "noise_source": str,
+                "by_recording": {"sin_sin-kp100": {"rms": float}},
+            }
+        },
+        "validation": {"position": {"rms": float, "by_recording": {"sin_sin-kp400": {"rms": float}}}},
+    },
+    "solver": {
+        "name": str,
+        "iterations": int,
+        "seconds": float,
+        "build_seconds": float,
+        "objective": float,
+        "starts": int,
+    },
+}
+"""Keys of result.json that others rely on, and the kinds of their values."""
+
+
+def assert_has(document: Mapping[str, Any], wanted: Mapping[str, Any], where: str = "result") -> None:
+    """Compare keys and kinds of values, level by level."""
+    for key, kind in wanted.items():
+        assert key in document, f"{where} has no {key}"
+        if isinstance(kind, Mapping):
+            assert_has(document[key], kind, f"{where}.{key}")
+        else:
+            assert isinstance(document[key], kind), f"{where}.{key} is {document[key]!r}"
+
+
+@pytest.fixture(scope="module")
+def estimate(tmp_path_factory: pytest.TempPathFactory) -> Estimate:
+    """The servo, with a bound that the viscous friction runs into."""
+    folder = tmp_path_factory.mktemp("problem")
+    document = servo_document()
+    document["drive"]["shafts"][0]["friction"]["viscous"] = {"guess": 0.05, "min": 0.04, "max": 0.2, "prior_std": 1.0}
+    path = write_problem(folder / "servo.yaml", document)
+    path.write_text(f"# Asked: {QUESTION}\n\n{path.read_text(encoding='utf-8')}", encoding="utf-8")
+    return identify(load_problem(path))
+
+
+@pytest.fixture(scope="module")
+def simulation(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    """The servo simulated with its guesses."""
+    return simulate(load_problem(write_servo(tmp_path_factory.mktemp("problem"))))
+
+
+def test_a_result_has_every_key_that_others_rely_on(estimate: Estimate) -> None:
+    """Keys and kinds of values."""
+    document = estimate_document(estimate)
+    assert_has(document, RESULT)
+    assert document["format"] == "friction-ocp-result/1"
+    assert document["status"] in ("converged", "not_converged")
+    assert list(document["parameters"]) == [item.name for item in estimate.parameters]
+
+
+def test_a_result_is_strict_json(estimate: Estimate) -> None:
+    """Where there is no number there is null: a parameter at its bound has no standard error and no interval."""
+    document = json.loads(json.dumps(estimate_document(estimate), allow_nan=False))
+    bounded = document["parameters"]["servo.friction.viscous"]
+    assert (bounded["verdict"], bounded["std_error"], bounded["interval95"]) == ("at_bound", None, None)
+    low, high = document["parameters"]["servo.inertia"]["interval95"]
+    assert low < document["parameters"]["servo.inertia"]["value"] < high
+
+
+def test_a_simulation_has_the_same_errors_and_no_parameters(simulation: Simulation) -> None:
+    """Its document is strict JSON of its own format."""
+    document = json.loads(json.dumps(simulation_document(simulation), allow_nan=False))
+    assert document["format"] == "friction-ocp-simulation/1"
+    assert_has(document["fit"], RESULT["fit"])
+    assert document["parameters"] == {}
+
+
+def test_the_fitted_problem_is_the_problem_with_its_answer(estimate: Estimate, tmp_path: Path) -> None:
+    """Guesses are the fitted values; bounds, prior and opening comment stay; recordings are found from its folder."""
+    text = fitted_problem(estimate.problem, estimate.values, tmp_path)
+    assert text is not None
+    content = yaml.safe_load(text)
+    viscous = content["drive"]["shafts"][0]["friction"]["viscous"]
+    value = estimate.values["servo.friction.viscous"]
+    assert viscous == {"guess": value, "min": 0.04, "max": 0.2, "prior_std": 1.0, "prior_mean": 0.05}
+    (tmp_path / "fitted.yaml").write_text(text, encoding="utf-8")
+    again = load_problem(tmp_path / "fitted.yaml")
+    assert again.question == estimate.problem.question
+    assert QUESTION in again.question
+    assert [use.recording.sha256 for use in again.recordings] == [
+        use.recording.sha256 for use in estimate.problem.recordings
+    ]
+
+
+def test_the_series_are_measurement_and_simulation_on_one_clock(simulation: Simulation, tmp_path: Path) -> None:
+    """result.h5 holds /<recording>/<channel>/{time, measured, simulated}, whose difference has the reported rms."""
+    write_result_series(tmp_path / "result.h5", simulation_series(simulation))
+    with h5py.File(tmp_path / "result.h5") as file:
+        for name, errors in simulation.train_errors["position"][1].items():
+            group = file[f"{name}/position"]
+            time, measured, simulated = (np.asarray(group[key]) for key in ("time", "measured", "simulated"))
+            assert time.shape == measured.shape == simulated.shape
+            assert np.all(np.diff(time) > 0)
+            assert np.sqrt(np.nanmean((simulated - measured) ** 2)) == pytest.approx(errors.rms)
+
+
+def test_reports_get_plain_arrays(simulation: Simulation) -> None:
+    """Recording, channel, then three arrays."""
+    arrays = plain_arrays(simulation_series(simulation))
+    assert list(arrays) == ["sin_sin-kp100", "sin_sin-kp400"]
+    assert set(arrays["sin_sin-kp100"]["position"]) == {"time", "measured", "simulated"}
+
+
+def test_a_file_is_renamed_into_place_when_it_is_complete(tmp_path: Path) -> None:
+    """Until the writer is done the old content stands."""
+    path = tmp_path / "result.json"
+    path.write_text("old", encoding="utf-8")
+
+    def write(staged: Path) -> None:
+        staged.write_text("new", encoding="utf-8")
+        assert path.read_text(encoding="utf-8") == "old"
+        assert staged.parent == path.parent
+
+    write_whole(path, write)
+    assert path.read_text(encoding="utf-8") == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_could_not_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    """An error or an interrupt in the middle leaves nothing behind."""
+    path = tmp_path / "result.json"
+    path.write_text("old", encoding="utf-8")
+
+    def write(staged: Path) -> NoReturn:
+        staged.write_text("ha", encoding="utf-8")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_whole(path, write)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
