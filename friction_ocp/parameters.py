@@ -48,9 +48,7 @@ Value = Any
 """float, Free, Tie or Directional in a drive as read; float or SX in a drive whose values are bound."""
 
 
-def quantity(
-    kind: str, meaning: str, default: Any = dataclasses.MISSING, nested: str | float | None = None
-) -> Any:
+def quantity(kind: str, meaning: str, default: Any = dataclasses.MISSING, nested: str | float | None = None) -> Any:
     """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader.
 
     `nested` says what the number is in the simpler model that is fitted first: the name of the field that it

@@ -9,11 +9,11 @@ import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
+from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.losses import Absolute, AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.stages import (
     ROUNDINGS,
@@ -63,9 +63,7 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     phases, span = Phases(progress, EXPECTED_PHASES), horizon(model)
     held = is_held(model.problem.drive)
     stated = bool(model.problem.estimation.process_noise)
-    first = (
-        Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
-    )
+    first = Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
     fitted = _hop(model, _staged(model, first, phases), phases)
     if held or not fits_free_run(model):
         return fitted
@@ -215,9 +213,7 @@ def _limits(model: Model) -> Tolerances:
     return replace(FINE, max_iterations=model.problem.estimation.max_iterations)
 
 
-def _race(
-    program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve
-) -> list[Solution]:
+def _race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve) -> list[Solution]:
     """Solve from every point and return the ends, best first."""
     return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
 

@@ -99,9 +99,7 @@ def _descend(
     return None
 
 
-def _stuck(
-    program: Program, point: Point, system: Linearisation, iteration: int, tolerances: Tolerances
-) -> Solution:
+def _stuck(program: Program, point: Point, system: Linearisation, iteration: int, tolerances: Tolerances) -> Solution:
     _, predicted = trial_step(program.space, point, system, 1e-6)
     relative = predicted / max(system.objective, 1e-300)
     if relative <= tolerances.stalled or predicted <= tolerances.negligible:
@@ -110,9 +108,7 @@ def _stuck(
     return Solution(point, system.objective, iteration, False, text)
 
 
-def trial_step(
-    space: ParameterSpace, point: Point, system: Linearisation, damping: float
-) -> tuple[Point, float]:
+def trial_step(space: ParameterSpace, point: Point, system: Linearisation, damping: float) -> tuple[Point, float]:
     """Return the damped Gauss-Newton point and the decrease that the quadratic model predicts."""
     reduced = reduce_system(system, damping)
     rows, margins = _constraint_rows(space, point.theta)

@@ -111,7 +111,9 @@ def parameter_space(
     )
 
 
-def _table(drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse) -> dict[str, object]:
+def _table(
+    drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse
+) -> dict[str, object]:
     """Return every number of the drive in one recording: fixed, fitted or tied."""
     table: dict[str, object] = {}
     ties: dict[str, str] = {}
@@ -171,6 +173,8 @@ def _active(vectors: Mapping[str, ca.SX], theta: ca.SX) -> tuple[int, ...]:
 def _constraints(problem: Problem, table: Mapping[str, object], theta: ca.SX) -> ca.Function | None:
     if not problem.constraints:
         return None
-    margins = [parse(text, tuple(table), f"constraints[{k}]").evaluate(table) for k, text in enumerate(problem.constraints)]
+    margins = [
+        parse(text, tuple(table), f"constraints[{k}]").evaluate(table) for k, text in enumerate(problem.constraints)
+    ]
     stacked = ca.vertcat(*[ca.SX(margin) for margin in margins])
     return ca.Function("constraints", [theta], [stacked, ca.densify(ca.jacobian(stacked, theta))])

@@ -190,9 +190,7 @@ class Program:
         self._add_measurements(index, result, slope, system)
         self._add_gaps(cut, nodes, result, slope, system)
         self._add_start(index, point, system)
-        blocks = Blocks(
-            system.node_node, system.node_next, system.node_theta, system.node_gradient
-        )
+        blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
     def _add_measurements(self, index: int, result: SweepResult, slope: FloatArray, system: _System) -> None:
@@ -268,9 +266,7 @@ class _System:
             np.zeros(count),
         )
 
-    def add(
-        self, j: int, by_node: FloatArray, by_theta: FloatArray, error: FloatArray, weight: FloatArray
-    ) -> None:
+    def add(self, j: int, by_node: FloatArray, by_theta: FloatArray, error: FloatArray, weight: FloatArray) -> None:
         """Add rows that depend on node j and the parameters."""
         scaled_node, scaled_theta = by_node * weight[:, None], by_theta * weight[:, None]
         self.node_node[j] += scaled_node.T @ by_node
@@ -292,4 +288,3 @@ class _System:
 
 def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:
     return 0.5 * float(np.sum(((theta - space.prior_mean) / space.prior_std) ** 2))
-

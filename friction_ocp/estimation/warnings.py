@@ -67,9 +67,7 @@ def _parameter_warning(item: NamedVerdict) -> str:
             )
 
 
-def _misfit_warnings(
-    doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored
-) -> list[str]:
+def _misfit_warnings(doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored) -> list[str]:
     texts: list[str] = []
     coloured = sum(not test.white for tests in residuals.values() for test in tests.values())
     total = sum(len(tests) for tests in residuals.values())

@@ -10,6 +10,7 @@ case against its 99 % band. Nothing here is fitted by the program that made the 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -22,7 +23,7 @@ import scipy.stats
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
-from plant import (  # noqa: E402
+from plant import (
     Plant,
     PlantFriction,
     PlantMotor,
@@ -32,14 +33,14 @@ from plant import (  # noqa: E402
     steps_and_multisine,
 )
 
-from friction_ocp.drive.parts import Channel as Sensor  # noqa: E402
-from friction_ocp.drive.parts import Drive, Motor, Shaft, Transmission  # noqa: E402
-from friction_ocp.estimation.estimate import identify  # noqa: E402
-from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse  # noqa: E402
-from friction_ocp.friction.element import FrictionElement  # noqa: E402
-from friction_ocp.friction.registry import friction_laws  # noqa: E402
-from friction_ocp.parameters import Free  # noqa: E402
-from friction_ocp.recording.recording import Channel, Recording  # noqa: E402
+from friction_ocp.drive.parts import Channel as Sensor
+from friction_ocp.drive.parts import Drive, Motor, Shaft, Transmission
+from friction_ocp.estimation.estimate import identify
+from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
+from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.registry import friction_laws
+from friction_ocp.parameters import Free
+from friction_ocp.recording.recording import Channel, Recording
 
 SECONDS, RATE = 4.0, 1000.0
 TORQUE_CONSTANT, MOTOR_INERTIA, LOAD_INERTIA, RATIO = 0.35, 0.002, 4.0, 50.0
@@ -98,14 +99,14 @@ def record(case: Case, seed: int) -> tuple[Recording, str]:
     rng = np.random.default_rng(seed)
     current = steps_and_multisine(np.array([0.5, 1.0, 2.0]), (0.2, 0.6), 0.3, (0.5, 40.0), SECONDS, rng)
     run = make_plant(case).simulate(SECONDS, {"drive.current": current}, rng)
-    channels = {
-        name: Channel(name, stamps, values, "rad") for name, (stamps, values) in run.channels.items()
-    }
+    channels = {name: Channel(name, stamps, values, "rad") for name, (stamps, values) in run.channels.items()}
     channels["current"] = Channel("current", np.asarray(current.time), np.asarray(current.value), "A")
     return Recording(f"draw{seed}", channels), current.hold
 
 
-def make_problem(case: Case, recording: Recording, hold: str, rng: np.random.Generator) -> tuple[Problem, dict[str, float]]:
+def make_problem(
+    case: Case, recording: Recording, hold: str, rng: np.random.Generator
+) -> tuple[Problem, dict[str, float]]:
     """Return the problem with starts up to a factor 1.5 off, and the true values."""
     truth: dict[str, float] = {"motor.inertia": MOTOR_INERTIA}
 
@@ -199,6 +200,7 @@ def main() -> int:
     parser.add_argument("--only", default="")
     options = parser.parse_args()
     began, passed = time.perf_counter(), True
+    os.environ.setdefault("FRICTION_OCP_THREADS", "1")  # two processes share two processors
     with ProcessPoolExecutor(2) as pool:
         if options.draws:
             print(f"{'case':<28} {'chi2':>8} {'99 % band':>16} {'max|z|':>6} {'robust':>4}")

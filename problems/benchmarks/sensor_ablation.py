@@ -6,6 +6,7 @@ python problems/benchmarks/sensor_ablation.py. One fit with all traces, then one
 from __future__ import annotations
 
 import math
+import os
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,6 +55,7 @@ def fit(left_out: str) -> Column:
 def measure() -> list[Column]:
     """Return the columns of the table."""
     outputs = [item.name for item in load_problem(PROBLEM).drive.outputs]
+    os.environ.setdefault("FRICTION_OCP_THREADS", "1")  # two processes share two processors
     with ProcessPoolExecutor(2) as pool:
         return list(pool.map(fit, ["", *outputs]))
 

@@ -1,7 +1,8 @@
 """Make data/two_mass: a position-controlled two-mass axis, simulated by the plant of the tests.
 
 python problems/two_mass/make_data.py [--seed 1]. The plant shares no code with the package: exact LuGre friction on the
-motor, exact dry friction on the load, a sampled cascade controller fed by a quantised encoder, noisy sensors.
+motor, exact dry friction on the load, a sampled cascade controller fed by a fine encoder, a log that keeps
+only 4096 steps a turn of it, noisy current and acceleration.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from friction_ocp.recording.hdf5 import write_recording  # noqa: E402
 from friction_ocp.recording.recording import Channel, Recording  # noqa: E402
 
 SAMPLE_TIME = 1e-3
-ENCODER_STEP = 2.0 * np.pi / 2**18
+LOOP_ENCODER_STEP, LOGGED_STEP = 2.0 * np.pi / 2**20, 2.0 * np.pi / 2**12
 UNITS = {"current": "A", "motor_position": "rad", "load_acceleration": "rad/s^2", "reference": "rad"}
 TRUTH = {
     "motor.inertia": 0.002,
@@ -61,11 +62,19 @@ def make_plant() -> Plant:
         motors=(PlantMotor("motor", "motor", torque_constant=TRUTH["motor.torque_constant"], controller="loop"),),
         controllers=(
             PlantController(
-                "loop", "cascade", "motor_position", kp=20.0, ki=6.0, kd=0.3, sample_time=SAMPLE_TIME, saturation=(-8, 8)
+                "loop",
+                "cascade",
+                "loop_encoder",
+                kp=20.0,
+                ki=6.0,
+                kd=0.3,
+                sample_time=SAMPLE_TIME,
+                saturation=(-8, 8),
             ),
         ),
         sensors=(
-            PlantSensor("motor_position", "motor.theta", period=SAMPLE_TIME, resolution=ENCODER_STEP),
+            PlantSensor("loop_encoder", "motor.theta", period=SAMPLE_TIME, resolution=LOOP_ENCODER_STEP),
+            PlantSensor("motor_position", "motor.theta", period=SAMPLE_TIME, resolution=LOGGED_STEP),
             PlantSensor("current", "motor.current", period=SAMPLE_TIME, noise_std=0.01),
             PlantSensor("load_acceleration", "load.alpha", period=2 * SAMPLE_TIME, noise_std=0.02),
         ),
@@ -93,7 +102,8 @@ def record(name: str, kind: str, seed: int) -> Recording:
     rng = np.random.default_rng(seed)
     wanted = reference(kind, rng)
     run = make_plant().simulate(8.0, {"reference.theta": wanted}, rng)
-    channels = {key: Channel(key, stamps, values, UNITS[key]) for key, (stamps, values) in run.channels.items()}
+    logged = {key: content for key, content in run.channels.items() if key in UNITS}
+    channels = {key: Channel(key, stamps, values, UNITS[key]) for key, (stamps, values) in logged.items()}
     channels["reference"] = Channel("reference", np.asarray(wanted.time), np.asarray(wanted.value), "rad")
     clocks = {"load_acceleration": "accelerometer", "reference": "reference"}
     channels = {
