@@ -6,10 +6,13 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Scope = Literal["shared", "recording"]
-Part = TypeVar("Part")
+Part = TypeVar("Part", bound="DataclassInstance")
 
 
 @dataclass(frozen=True)
@@ -127,10 +130,10 @@ def _bound(value: Value, path: str, values: Mapping[str, Any]) -> Any:
 def bind(part: Part, prefix: str, values: Mapping[str, Any]) -> Part:
     """Return the part with every number replaced by `values[path]` (floats or SX)."""
     changes: dict[str, Any] = {}
-    for item in dataclasses.fields(part):  # pyright: ignore[reportArgumentType]
+    for item in dataclasses.fields(part):
         value, path = getattr(part, item.name), _path(prefix, item)
         if "kind" in item.metadata:
             changes[item.name] = _bound(value, path, values)
         elif _is_part(value):
             changes[item.name] = bind(value, path, values)
-    return dataclasses.replace(part, **changes)  # pyright: ignore[reportArgumentType]
+    return dataclasses.replace(part, **changes)

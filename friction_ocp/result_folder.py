@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, Simulation
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.recording.result_series import RecordingSeries
@@ -38,10 +39,15 @@ def save(result: Estimate | Simulation, folder: str | Path) -> Path:
 
 
 def fitted_problem(problem: Problem, values: Mapping[str, float], folder: Path) -> str | None:
-    """Return the text of fitted.yaml; None for a problem that did not come from a file."""
+    """Return the text of fitted.yaml; None for a problem that its file, if any, no longer describes."""
     from friction_ocp.problem_file.dump import dump_problem
 
-    return None if problem.path is None else dump_problem(problem.path, values, folder)
+    if problem.path is None:
+        return None
+    try:
+        return dump_problem(problem.path, values, folder)
+    except FrictionOcpError:  # parameters that were added after the file was read
+        return None
 
 
 def write_results(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -133,6 +134,12 @@ def test_the_fitted_problem_is_the_problem_with_its_answer(estimate: Estimate, t
     assert [use.recording.sha256 for use in again.recordings] == [
         use.recording.sha256 for use in estimate.problem.recordings
     ]
+
+
+def test_a_problem_that_its_file_does_not_describe_has_no_fitted_file(estimate: Estimate, tmp_path: Path) -> None:
+    """Built from parts, or given further parameters in Python: the result is written without fitted.yaml."""
+    assert fitted_problem(replace(estimate.problem, path=None), estimate.values, tmp_path) is None
+    assert fitted_problem(estimate.problem, {**estimate.values, "servo.friction.load.coulomb": 0.1}, tmp_path) is None
 
 
 def test_the_series_are_measurement_and_simulation_on_one_clock(simulation: Simulation, tmp_path: Path) -> None:

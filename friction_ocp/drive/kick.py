@@ -70,21 +70,10 @@ class Step:
     """(groups + 1,) rounding of the sign by group, in rad/s; last the relative rounding of backlash corners."""
 
 
-def kick(mech: Mechanism, step: Step) -> Kick:
-    """Return the speeds after a step of `step.h`."""
-    done = implicit_kick(mech, step)
-    if done.unknown is None:
-        return done
-    symbols, solution = done.unknown.symbols, done.unknown.solution
-    load = {name: ca.substitute(ca.SX(torque), symbols, solution) for name, torque in done.load.items()}
-    v, mean = (ca.substitute(vector, symbols, solution) for vector in (done.v, done.mean))
-    return Kick(v, mean, load)
-
-
 def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     """Return the speeds after a step in terms of the torques through loaded rigid joints, still to be solved for."""
     joints = mech.loaded_joints()
-    symbols = ca.SX.sym("transmitted", len(joints))  # pyright: ignore[reportArgumentType]
+    symbols = ca.SX.sym("transmitted", len(joints))
     torques, stiffening = _applied(mech, step)
     corner = step.width[len(mech.topology.roots)]
     load = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
@@ -100,7 +89,7 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
 def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
     """Return the torque on each shaft and, by group, the derivative of its torque by its own speed."""
     groups = len(mech.topology.roots)
-    speed = ca.SX.sym("speed", groups)  # pyright: ignore[reportArgumentType]
+    speed = ca.SX.sym("speed", groups)
     at = Motion(step.at.q, speed, step.at.extra, step.at.memory)
     symbolic = mech.applied_torques(at, step.width[groups])
     total = [_group_sum(mech, g, symbolic) for g in range(groups)]

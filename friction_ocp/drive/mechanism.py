@@ -21,7 +21,7 @@ from friction_ocp.friction.smoothing import soft_threshold, where
 
 def symbol(name: str) -> ca.SX:
     """Return a scalar SX symbol."""
-    return ca.SX.sym(name)  # pyright: ignore[reportArgumentType]
+    return ca.SX.sym(name)
 
 
 def column(items: list[Any]) -> ca.SX:

@@ -24,19 +24,6 @@ INSTANT = 1e-2
 
 
 @dataclass(frozen=True)
-class Implicit:
-    """A model function before the torques through rigid joints that friction depends on are solved for.
-
-    Differentiating this is cheaper than differentiating Newton's method.
-    """
-
-    relation: ca.Function
-    """(arguments, torques) -> (value, torques found); `torques` solve torques = torques found."""
-    torques: ca.Function
-    """arguments -> torques."""
-
-
-@dataclass(frozen=True)
 class SteppedDrive:
     """A drive in discrete time.
 
@@ -55,8 +42,12 @@ class SteppedDrive:
     output: ca.Function
     tick: ca.Function | None
     start: ca.Function
-    implicit: Mapping[str, Implicit]
-    """`step` and `output` in implicit form, where friction depends on the torque through a rigid joint."""
+    implicit: Mapping[str, ca.Function]
+    """`step` and `output` in implicit form, where friction depends on torques through rigid joints.
+
+    (arguments, torques) -> (value, torques found), before torques = torques found is solved: differentiating this
+    is cheaper than differentiating Newton's method.
+    """
 
 
 @dataclass(frozen=True)
@@ -79,7 +70,7 @@ def _state(mech: Mechanism) -> _State:
         len(mech.extra_names),
         len(mech.memory_names),
     )
-    parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]  # pyright: ignore[reportArgumentType]
+    parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]
     return _State(ca.vertcat(*parts), *parts)
 
 
@@ -103,15 +94,11 @@ class _Expression:
             value = ca.substitute(value, unknown.symbols, unknown.solution)
         return value
 
-    def implicit(self, arguments: list[ca.SX]) -> Implicit:
-        """Return the value as an implicit function of `arguments`."""
+    def implicit(self, arguments: list[ca.SX]) -> ca.Function:
+        """Return (arguments, unknown torques) -> (value, torques found)."""
         symbols = ca.vertcat(*[unknown.symbols for unknown in self.unknowns])
         found = ca.vertcat(*[unknown.found for unknown in self.unknowns])
-        torques = _Expression(symbols, self.unknowns).solved()
-        return Implicit(
-            ca.Function("relation", [*arguments, symbols], [self.value, found]),
-            ca.Function("torques", arguments, [torques]),
-        )
+        return ca.Function("relation", [*arguments, symbols], [self.value, found])
 
 
 def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
@@ -205,8 +192,8 @@ def stepped(drive: Drive) -> SteppedDrive:
     state = _state(mech)
     groups = len(mech.topology.roots)
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
-    h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")  # pyright: ignore[reportArgumentType]
-    y, dy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy"))  # pyright: ignore[reportArgumentType]
+    h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
+    y, dy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy"))
     arguments = [state.x, u, p, h, width]
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None

@@ -64,7 +64,7 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
     if shaft.friction.load is None or not runs:
         return [0.0]
     mech = model.drive.mechanism
-    q = ca.SX.sym("q", len(mech.topology.roots))  # pyright: ignore[reportArgumentType]
+    q = ca.SX.sym("q", len(mech.topology.roots))
     at = Motion(q, ca.SX.zeros(q.numel()), ca.SX.zeros(8), ca.SX.zeros(16))
     joint = mech.load_joint(shaft)
     if joint.rigid:
@@ -90,13 +90,16 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
 
 def _gravity(mech: Mechanism, name: str, at: Motion) -> ca.SX:
     gravity = mech.drive.shaft(name).gravity
-    return ca.SX(0.0) if gravity is None else gravity.torque * ca.sin(mech.shaft_angle(name, at) + gravity.phase)
+    if gravity is None:
+        return ca.SX(0.0)
+    angle: ca.SX = mech.shaft_angle(name, at) + gravity.phase
+    return gravity.torque * ca.sin(angle)
 
 
 def _curve(
     model: Model, shaft: Shaft, theta: FloatArray, covariance: FloatArray, fastest: float, load: float
 ) -> FrictionCurve:
-    omega = ca.SX.sym("omega")  # pyright: ignore[reportArgumentType]
+    omega = ca.SX.sym("omega")
     parameters = ca.vertcat(*model.drive.mechanism.parameters.values())
     element = shaft.friction
     positive, negative = (element.magnitude(side, smooth_abs(omega), load) for side in ("positive", "negative"))

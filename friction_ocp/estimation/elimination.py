@@ -51,7 +51,7 @@ def _eliminate(blocks: Blocks, damping: float) -> Eliminated:
     count, states = blocks.node_gradient.shape
     right = -np.concatenate([blocks.node_gradient[:, :, None], blocks.node_theta], axis=2)
     diagonal = blocks.node_node.copy()
-    index = np.arange(states)
+    index = np.arange(int(states))
     diagonal[:, index, index] *= 1.0 + damping
     diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
     upper = np.empty_like(blocks.node_next)
@@ -61,7 +61,8 @@ def _eliminate(blocks: Blocks, damping: float) -> Eliminated:
             diagonal[j] -= lower @ upper[j - 1]
             right[j] -= lower @ right[j - 1]
         if j < count - 1:
-            solved = np.linalg.solve(diagonal[j], np.concatenate([blocks.node_next[j], right[j]], axis=1))
+            both = np.concatenate([blocks.node_next[j], right[j]], axis=1)
+            solved = np.asarray(np.linalg.solve(diagonal[j], both), dtype=np.float64)
             upper[j], right[j] = solved[:, :states], solved[:, states:]
         else:
             right[j] = np.linalg.solve(diagonal[j], right[j])

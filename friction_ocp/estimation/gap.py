@@ -20,7 +20,8 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     durations = np.diff(item.grid.time[first])[:-1]
     if not model.problem.estimation.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
-    return np.array([np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, span))) for span in durations])
+    roots = [np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, span))) for span in durations]
+    return np.array(roots, dtype=np.float64)
 
 
 def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
@@ -49,6 +50,6 @@ def _group_noise(model: Model, item: Experiment) -> FloatArray:
     power = [ca.SX(0.0) for _ in mech.topology.roots]
     for shaft, density in model.problem.estimation.process_noise.items():
         power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
-    spread = [ca.sqrt(power[group]) / mech.inertia(group) for group in range(len(power))]
+    spread: list[ca.SX] = [ca.sqrt(power[group]) / mech.inertia(group) for group in range(len(power))]
     function = ca.Function("noise", [ca.vertcat(*mech.parameters.values())], [ca.vertcat(*spread)])
     return np.asarray(function(model.space.numbers(model.space.guess, item.name))).ravel()

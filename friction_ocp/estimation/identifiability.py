@@ -8,7 +8,7 @@ import numpy as np
 
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.uncertainty import Uncertainty
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 CONDITION_INDEX = 30.0
 VARIANCE_SHARE = 0.5
@@ -44,7 +44,7 @@ def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tu
     return tuple(result)
 
 
-def _unseen(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> FloatArray:
+def _unseen(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> BoolArray:
     """Return which parameters the data do not see even with all others known.
 
     Their conditional standard error exceeds their own size and half of their bounds: nothing is excluded.
@@ -57,7 +57,7 @@ def _unseen(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> Flo
     return (conditional > np.maximum(np.abs(theta), space.scale)) & (conditional > size)
 
 
-def _partners(found: Uncertainty, free: FloatArray) -> list[list[int]]:
+def _partners(found: Uncertainty, free: BoolArray) -> list[list[int]]:
     """Return for each parameter those with which it shares a near-dependency of the information matrix."""
     count = found.information.shape[0]
     partners: list[set[int]] = [set() for _ in range(count)]
@@ -72,7 +72,7 @@ def _partners(found: Uncertainty, free: FloatArray) -> list[list[int]]:
     for k, value in enumerate(values):
         if np.sqrt(values[-1] / value) <= CONDITION_INDEX:
             continue
-        together = index[shares[:, k] > VARIANCE_SHARE]
+        together = [int(one) for one in index[shares[:, k] > VARIANCE_SHARE]]
         for one in together:
-            partners[one].update(int(other) for other in together if other != one)
+            partners[one].update(other for other in together if other != one)
     return [sorted(group) for group in partners]

@@ -74,7 +74,7 @@ def _of_recording(
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
         moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
-        flat = gap.ravel()
+        flat: FloatArray = gap.ravel()
         parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
     order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")
     return tuple(np.concatenate(column)[order] for column in zip(*parts, strict=True))  # pyright: ignore[reportReturnType]

@@ -139,7 +139,7 @@ def _typical(use: RecordingUse, name: str) -> float:
 def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> ComplexArray:
     """Return the eigenvalues, 1/s, of the motion about standstill without dry friction."""
     tiny, states = 1e-6, len(drive.state_names)
-    x = ca.SX.sym("x", states)  # pyright: ignore[reportArgumentType]
+    x = ca.SX.sym("x", states)
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
     after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
     slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -37,7 +38,6 @@ class ParameterSpace:
     """By recording: parameters -> (numbers of the drive, derivative of the active ones)."""
     constraints: ca.Function | None
     """Parameters -> (values, Jacobian) of expressions that must be >= 0."""
-    constraint_texts: tuple[str, ...] = ()
 
     @property
     def scale(self) -> FloatArray:
@@ -82,7 +82,7 @@ def parameter_space(
             Finding(str(problem.path or problem.title), "nothing to fit", "a parameter with {guess: ...} is fitted")
         )
     names = tuple(name for name, _ in entries)
-    theta = ca.SX.sym("theta", len(names))  # pyright: ignore[reportArgumentType]
+    theta = ca.SX.sym("theta", len(names))
     symbols = {name: theta[k] for k, name in enumerate(names)}
     tables = {use.name: _table(problem.drive, values, symbols, use) for use in problem.recordings}
     leaf_vectors = {name: ca.vertcat(*[ca.SX(table[leaf]) for leaf in leaf_names]) for name, table in tables.items()}
@@ -106,16 +106,15 @@ def parameter_space(
         active=active,
         maps=maps,
         constraints=_constraints(problem, tables[problem.train[0].name], theta),
-        constraint_texts=problem.constraints,
         **{key: np.asarray(column, dtype=float) for key, column in fields.items()},
     )
 
 
 def _table(
     drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Return every number of the drive in one recording: fixed, fitted or tied."""
-    table: dict[str, object] = {}
+    table: dict[str, Any] = {}
     ties: dict[str, str] = {}
     for path, value in values.items():
         if path in use.set:

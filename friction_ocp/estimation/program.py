@@ -7,7 +7,7 @@ recording the gaps vanish and the program is the free run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -94,10 +94,6 @@ class Program:
     width: FloatArray
     """(groups + 1,) smoothing of the sign by group and of backlash corners; zeros are exact."""
     loss: AbstractLoss = Squares()
-
-    def with_width(self, width: FloatArray) -> Program:
-        """Return the program with another smoothing."""
-        return replace(self, width=width)
 
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement."""
@@ -218,10 +214,10 @@ class Program:
         states = nodes.shape[1]
         for j in range(cut.count - 1):
             weight = cut.gap_weight[j]
-            gap = weight @ (result.end[j] - nodes[j + 1])
+            gap: FloatArray = weight @ (result.end[j] - nodes[j + 1])
             by_node, by_theta = weight @ result.dend[j][:, :states], weight @ (result.dend[j][:, states:] @ slope)
             system.cost += 0.5 * float(gap @ gap)
-            system.add(j, by_node, by_theta, gap, np.ones(states))
+            system.add(j, by_node, by_theta, gap, np.ones(gap.size))
             system.node_next[j] -= by_node.T @ weight
             system.node_node[j + 1] += weight.T @ weight
             system.node_theta[j + 1] -= weight.T @ by_theta
@@ -237,7 +233,7 @@ class Program:
             suggested, slopes = self.measured_states(item, point.theta, cut.first[cut.tied])
             for j, expected, slope in zip(cut.tied, suggested, slopes, strict=True):
                 weight = np.diag(cut.start_weight[j])
-                error = cut.start_weight[j] * (point.nodes[index][j] - expected)
+                error: FloatArray = cut.start_weight[j] * (point.nodes[index][j] - expected)
                 system.cost += 0.5 * float(error @ error)
                 system.add(int(j), weight, -weight @ slope, error, np.ones(error.size))
 

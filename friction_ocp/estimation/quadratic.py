@@ -32,7 +32,7 @@ def bounded_step(
 
 def _dual_active_set(h: FloatArray, g: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """Minimise 1/2 x'hx + g'x subject to a x >= b, rows of a normalised."""
-    inverse = np.linalg.inv(h)
+    inverse = np.asarray(np.linalg.inv(h), dtype=np.float64)
     x = -inverse @ g
     active: list[int] = []
     multipliers = np.zeros(0)
@@ -59,13 +59,12 @@ def _add_constraint(
     own = 0.0
     for _ in range(2 * len(b) + 2):
         n = a[active]
-        towards = inverse @ a[new]
+        towards: FloatArray = inverse @ a[new]
+        reaction, direction = np.zeros(0), towards
         if active:
             gram = n @ inverse @ n.T
-            reaction = np.linalg.lstsq(gram, n @ towards, rcond=None)[0]
+            reaction = np.asarray(np.linalg.lstsq(gram, n @ towards, rcond=None)[0], dtype=np.float64)
             direction = towards - inverse @ n.T @ reaction
-        else:
-            reaction, direction = np.zeros(0), towards
         rate = float(a[new] @ direction)
         full = (b[new] - float(a[new] @ x)) / rate if rate > 1e-14 else np.inf
         blocked = [(multipliers[k] / reaction[k], k) for k in range(len(active)) if reaction[k] > 1e-14]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,15 +19,6 @@ ROUNDINGS = (1.0, 0.2, 0.05, 0.01)
 WIDTHS = (0.1, 0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the
 first: there a wide smoothing only invents slopes and breaks at low speed."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One program to solve and what to call it."""
-
-    name: str
-    program: Program
-
 
 Experiments = tuple[Experiment, ...]
 
@@ -81,9 +72,9 @@ def free_run(
 
 def windows(item: Experiment, horizon: float | None) -> IntArray:
     """Return the first nodes of windows of about `horizon` s; the whole recording where it is None."""
-    duration = float(item.grid.time[-1] - item.grid.time[0])
-    count = 1 if horizon is None else max(1, round(duration / horizon))
-    edges = np.linspace(item.grid.time[0], item.grid.time[-1], count + 1)
+    start, end = float(item.grid.time[0]), float(item.grid.time[-1])
+    count = 1 if horizon is None else max(1, round((end - start) / horizon))
+    edges = np.linspace(start, end, count + 1)
     return np.unique(np.clip(np.searchsorted(item.grid.time, edges - 1e-9), 0, item.grid.time.size - 1))
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.influence import Influence
 from friction_ocp.estimation.parameter_space import ParameterSpace
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
+
+stats: Any = _stats  # its own types are incomplete
 
 CONFIDENCE = 0.95
 NO_INFORMATION = 1e-30
@@ -26,8 +29,8 @@ class Uncertainty:
     """(parameters, parameters); rows and columns of parameters at a bound are NaN."""
     kind: str
     """`gauss_newton` or `sandwich`."""
-    at_bound: FloatArray
-    """(parameters,) booleans."""
+    at_bound: BoolArray
+    """(parameters,)."""
     freedom: float
     """Degrees of freedom of the t distribution behind the intervals."""
     information: FloatArray
@@ -45,11 +48,11 @@ class Uncertainty:
 
     def interval(self, theta: FloatArray) -> FloatArray:
         """Return (parameters, 2) intervals at 95 %."""
-        reach = float(_stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.freedom)) * self.std_error
+        reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.freedom)) * self.std_error
         return np.column_stack([theta - reach, theta + reach])
 
 
-def at_bounds(space: ParameterSpace, theta: FloatArray) -> FloatArray:
+def at_bounds(space: ParameterSpace, theta: FloatArray) -> BoolArray:
     """Return which parameters lie on one of their bounds."""
     span = np.where(np.isfinite(space.upper - space.lower), space.upper - space.lower, np.abs(theta) + 1.0)
     return (theta - space.lower <= 1e-6 * span) | (space.upper - theta <= 1e-6 * span)
@@ -81,7 +84,7 @@ def _density_weight(found: Influence) -> FloatArray:
     """Curvature of the absolute loss: twice the density of the residuals at zero (Silverman's bandwidth)."""
     r = found.residual
     spread = min(float(np.std(r)), float(np.subtract(*np.quantile(r, [0.75, 0.25]))) / 1.34)
-    width = 0.9 * spread * r.size**-0.2
+    width: float = 0.9 * spread * r.size**-0.2
     density = float(np.mean(np.exp(-0.5 * (r / width) ** 2))) / (width * np.sqrt(2.0 * np.pi))
     return np.full(r.size, 2.0 * density)
 
@@ -95,7 +98,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
     return (vectors / values) @ vectors.T / np.outer(size, size)
 
 
-def _block_scores(found: Influence, free: FloatArray) -> tuple[FloatArray, int]:
+def _block_scores(found: Influence, free: BoolArray) -> tuple[FloatArray, int]:
     """Return the sum of outer products of block scores, corrected for the number of blocks, and that number."""
     scores = found.jacobian[:, free] * found.score_weight[:, None]
     recordings = np.unique(found.recording)

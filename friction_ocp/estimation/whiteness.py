@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.simulation.grid import FloatArray
+
+stats: Any = _stats  # its own types are incomplete
 
 LAGS = 20
 SIGNIFICANCE = 0.01
@@ -40,5 +43,6 @@ def whiteness(time: FloatArray, residual: FloatArray) -> Whiteness:
     used = min(LAGS, lags)
     statistic = count * (count + 2.0) * float(np.sum(rho[:used] ** 2 / (count - np.arange(1, used + 1))))
     step = float(np.median(np.diff(time)))
-    p_value = float(_stats.chi2.sf(statistic, used))
-    return Whiteness(step * np.arange(1, lags + 1), rho, 1.96 / np.sqrt(max(count, 1)), p_value)
+    p_value = float(stats.chi2.sf(statistic, used))
+    lag_s = np.asarray(step * np.arange(1, lags + 1), dtype=np.float64)
+    return Whiteness(lag_s, rho, 1.96 / np.sqrt(max(count, 1)), p_value)

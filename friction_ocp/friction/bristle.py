@@ -67,6 +67,3 @@ class Dahl(AbstractFrictionLaw):
 
     def magnitude(self, speed: Any) -> Any:
         return self.level(speed) + self.sigma2 * speed
-
-
-BristleLaw = LuGre | Dahl

@@ -128,7 +128,7 @@ class FrictionElement:
         slopes: list[Any] = []
         sides: tuple[tuple[Direction, float], ...] = (("positive", 1.0), ("negative", -1.0))
         for side, sign in sides:
-            speed = ca.SX.sym("speed")  # pyright: ignore[reportArgumentType]
+            speed = ca.SX.sym("speed")
             level = ca.SX(self.magnitude(side, speed, transmitted))
             slope = ca.jacobian(level, speed)
             now = positive_part(sign * omega)

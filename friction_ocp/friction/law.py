@@ -21,7 +21,7 @@ def _toward(value: Any, direction: Direction) -> Any:
     if isinstance(value, Directional):
         return value.positive if direction == "positive" else value.negative
     if isinstance(value, tuple):
-        return tuple(_toward(item, direction) for item in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        return tuple(_toward(item, direction) for item in value)  # pyright: ignore[reportUnknownVariableType]
     return value
 
 

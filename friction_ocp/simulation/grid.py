@@ -11,6 +11,7 @@ from friction_ocp.drive.parts import Controller
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 COMPUTE, APPLY = 1, 2
 

@@ -145,9 +145,9 @@ class InterpretedKernel(AbstractKernel):
         """Return (course, control, p, width) -> course after one step or tick."""
         step, item, states = self._maps["step"], self._maps[name], self._states
         size = states * (states + len(self._active)) if derivatives else 0
-        sensitivities = ca.SX.sym("s", size)  # pyright: ignore[reportArgumentType]
-        torques = ca.SX.sym("torques", step.unknowns)  # pyright: ignore[reportArgumentType]
-        h, kind = (ca.SX.sym(symbol) for symbol in ("h", "kind"))  # pyright: ignore[reportArgumentType]
+        sensitivities = ca.SX.sym("s", size)
+        torques = ca.SX.sym("torques", step.unknowns)
+        h, kind = (ca.SX.sym(symbol) for symbol in ("h", "kind"))
         x, u, p = item.arguments[:3]
         width = step.arguments[4]
         arguments = [x, u, p, kind] if name == "tick" else [x, u, p, h, width]

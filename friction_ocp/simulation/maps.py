@@ -110,7 +110,7 @@ def delay_indices(drive: SteppedDrive) -> tuple[int, ...]:
 
 
 def _symbols(function: ca.Function) -> list[ca.SX]:
-    return [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]  # pyright: ignore[reportArgumentType]
+    return [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]
 
 
 def _explicit(name: str, arguments: Sequence[ca.SX], value: ca.SX) -> SweepMap:
@@ -119,13 +119,13 @@ def _explicit(name: str, arguments: Sequence[ca.SX], value: ca.SX) -> SweepMap:
 
 
 def _implicit(name: str, drive: SteppedDrive) -> SweepMap:
-    implicit = drive.implicit.get(name)
-    if implicit is None:
+    relation = drive.implicit.get(name)
+    if relation is None:
         function: ca.Function = getattr(drive, name)
         arguments = _symbols(function)
         return _explicit(f"fo_{name}", arguments, function.call(arguments, True, False)[0])
-    *arguments, torques = _symbols(implicit.relation)
-    value, found = implicit.relation.call([*arguments, torques], True, False)
+    *arguments, torques = _symbols(relation)
+    value, found = relation.call([*arguments, torques], True, False)
     return _without_idle_torques(SweepMap(f"fo_{name}", tuple(arguments), torques, value, found))
 
 

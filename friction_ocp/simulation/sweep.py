@@ -105,7 +105,7 @@ def _pieces(requests: Sequence[SweepRequest], threads: int) -> list[tuple[int, i
 
 
 def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:
-    arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(4)]  # pyright: ignore[reportArgumentType]
+    arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(4)]
     value = drive.start.call(arguments, True, False)[0]
     chosen = ca.vertcat(*[arguments[3][k] for k in active]) if active else ca.SX(0, 1)
     return ca.Function("start", arguments, [ca.densify(value), ca.densify(ca.jacobian(value, chosen))])
