@@ -10,7 +10,6 @@ from typing import Any
 
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, Simulation
-from friction_ocp.estimation.problem import Problem
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
 
@@ -31,21 +30,22 @@ def save(result: Estimate | Simulation, folder: str | Path) -> Path:
     """Write everything that a command leaves behind and return the folder."""
     target = Path(folder)
     if isinstance(result, Estimate):
-        fitted = fitted_problem(result.problem, result.values, target)
+        fitted = fitted_problem(result, target)
         write_results(target, estimate_document(result), simulation_series(result.simulation), fitted)
     else:
         write_results(target, simulation_document(result), simulation_series(result))
     return target
 
 
-def fitted_problem(problem: Problem, values: Mapping[str, float], folder: Path) -> str | None:
+def fitted_problem(estimate: Estimate, folder: Path) -> str | None:
     """Return the text of fitted.yaml; None for a problem that its file, if any, no longer describes."""
     from friction_ocp.problem_file.dump import dump_problem
 
-    if problem.path is None:
+    path = estimate.problem.path
+    if path is None:
         return None
     try:
-        return dump_problem(problem.path, values, folder)
+        return dump_problem(path, estimate.values, folder, estimate.simulation.max_step)
     except FrictionOcpError:  # parameters that were added after the file was read
         return None
 

@@ -121,7 +121,7 @@ def test_a_simulation_has_the_same_errors_and_no_parameters(simulation: Simulati
 
 def test_the_fitted_problem_is_the_problem_with_its_answer(estimate: Estimate, tmp_path: Path) -> None:
     """Guesses are the fitted values; bounds, prior and opening comment stay; recordings are found from its folder."""
-    text = fitted_problem(estimate.problem, estimate.values, tmp_path)
+    text = fitted_problem(estimate, tmp_path)
     assert text is not None
     content = yaml.safe_load(text)
     viscous = content["drive"]["shafts"][0]["friction"]["viscous"]
@@ -138,8 +138,9 @@ def test_the_fitted_problem_is_the_problem_with_its_answer(estimate: Estimate, t
 
 def test_a_problem_that_its_file_does_not_describe_has_no_fitted_file(estimate: Estimate, tmp_path: Path) -> None:
     """Built from parts, or given further parameters in Python: the result is written without fitted.yaml."""
-    assert fitted_problem(replace(estimate.problem, path=None), estimate.values, tmp_path) is None
-    assert fitted_problem(estimate.problem, {**estimate.values, "servo.friction.load.coulomb": 0.1}, tmp_path) is None
+    assert fitted_problem(replace(estimate, problem=replace(estimate.problem, path=None)), tmp_path) is None
+    added = replace(estimate.parameters[0], name="servo.friction.load.coulomb")
+    assert fitted_problem(replace(estimate, parameters=(*estimate.parameters, added)), tmp_path) is None
 
 
 def test_the_series_are_measurement_and_simulation_on_one_clock(simulation: Simulation, tmp_path: Path) -> None:

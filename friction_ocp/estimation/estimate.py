@@ -10,6 +10,7 @@ import numpy as np
 
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
 from friction_ocp.estimation.fit import Fitted, fit, program_builder
 from friction_ocp.estimation.gauss_newton import Solution
@@ -70,6 +71,8 @@ class Simulation:
     """By output channel."""
     state_names: tuple[str, ...]
     horizon_s: float | None
+    max_step: float
+    """Longest integrator step that was used, s."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,9 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     """
     began = time.perf_counter()
     model = prepare(problem)
+    if not model.space.names:
+        where = str(problem.path or problem.title)
+        raise FrictionOcpError(Finding(where, "nothing to fit", "a parameter with {guess: ...} is fitted"))
     built = time.perf_counter()
     reports: list[Report] = []
 
@@ -185,6 +191,7 @@ def simulate_model(model: Model, theta: FloatArray) -> Simulation:
         units={item.name: signal_unit(model.problem.drive, item.measures) for item in model.problem.drive.outputs},
         state_names=model.drive.state_names,
         horizon_s=horizon(model),
+        max_step=model.max_step,
     )
 
 

@@ -60,7 +60,25 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     A drive that something holds is fitted on its free run at once. One that drifts is fitted on relaxed segments
     first, and on free runs over growing windows after that, where free runs are asked for.
     """
-    phases, span = Phases(progress, EXPECTED_PHASES), horizon(model)
+    phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
+    models = [replace(model, space=model.space.moved(start)) for start in start_points(model)]
+    return min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)
+
+
+def start_points(model: Model) -> list[FloatArray]:
+    """Return the guess and, for more than one start, random points within a factor sqrt(10) of it (seeded)."""
+    options, space = model.problem.estimation, model.space
+    rng = np.random.default_rng(options.seed)
+    points = [space.guess]
+    for _ in range(options.starts - 1):
+        factor = 10.0 ** rng.uniform(-0.5, 0.5, space.guess.size)
+        shift = rng.uniform(-1.0, 1.0, space.guess.size) * space.scale
+        points.append(space.clip(np.where(space.guess != 0, space.guess * factor, shift)))
+    return points
+
+
+def _fit_once(model: Model, phases: Phases) -> Fitted:
+    span = horizon(model)
     held = is_held(model.problem.drive)
     stated = bool(model.problem.estimation.process_noise)
     first = Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
@@ -194,7 +212,7 @@ def _hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         theta = model.space.clip(best.point.theta + step)
         nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
         point = solve_gauss_newton(coarse, Point(theta, nodes), COARSE, watch).point
-        end = solve_gauss_newton(program, point, FINE, watch)
+        end = solve_gauss_newton(program, point, _limits(model), watch)
         iterations += end.iterations
         best = min(best, end, key=lambda solution: solution.objective)
     return Fitted(replace(best, iterations=iterations), program)

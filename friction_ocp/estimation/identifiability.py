@@ -30,7 +30,7 @@ def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tu
     """Judge every parameter."""
     unseen = _unseen(space, theta, found)
     partners = _partners(found, ~(found.at_bound | unseen))
-    vague = found.std_error > MATERIAL * np.abs(theta)
+    vague = ~(found.std_error <= MATERIAL * np.abs(theta))
     result: list[Verdict] = []
     for k in range(theta.size):
         if found.at_bound[k]:

@@ -41,6 +41,8 @@ class Model:
     """(groups + 1,) typical speed of each group and 1 for the backlash corners, to scale the smoothing."""
     state_scale: FloatArray
     """(states,) typical size of each state."""
+    max_step: float
+    """Longest integrator step, s."""
 
     @property
     def noise(self) -> FloatArray:
@@ -72,6 +74,7 @@ def prepare(problem: Problem) -> Model:
         floors=floors,
         speed_scale=_speed_scale(drive, states),
         state_scale=_state_scale(states),
+        max_step=max_step,
     )
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
-from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.expressions import parse, resolve_ties
 from friction_ocp.parameters import Free, Leaf, Tie
@@ -77,10 +76,6 @@ def parameter_space(
     for path, value in free.items():
         owners = [use.name for use in problem.train if path not in use.set] if value.scope == "recording" else [""]
         entries += [(f"{path}@{owner}" if owner else path, value) for owner in owners]
-    if not entries:
-        raise FrictionOcpError(
-            Finding(str(problem.path or problem.title), "nothing to fit", "a parameter with {guess: ...} is fitted")
-        )
     names = tuple(name for name, _ in entries)
     theta = ca.SX.sym("theta", len(names))
     symbols = {name: theta[k] for k, name in enumerate(names)}

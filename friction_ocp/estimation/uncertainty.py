@@ -17,6 +17,8 @@ stats: Any = _stats  # its own types are incomplete
 CONFIDENCE = 0.95
 NO_INFORMATION = 1e-30
 """Stands for the information on a parameter that no residual depends on."""
+SMALLEST_INFORMATION, UNTOLD = 1e-14, 1e-12
+"""Scaled information below which rounding decides, and from which a direction counts as told by the data."""
 MIN_BLOCKS, MAX_BLOCKS = 24, 200
 """Blocks of residuals that the robust covariance is summed over: enough to average, long enough to be independent."""
 
@@ -69,15 +71,15 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
         information = found.jacobian.T @ (_density_weight(found)[:, None] * found.jacobian) + found.prior
     bound = at_bounds(space, theta)
     free = ~bound
-    inverse = _inverse(information[np.ix_(free, free)])
+    told, untold = _inverse(information[np.ix_(free, free)])
     covariance = np.full(information.shape, np.nan)
     if white and not absolute:
-        covariance[np.ix_(free, free)] = inverse
+        covariance[np.ix_(free, free)] = told + untold
         return Uncertainty(covariance, "gauss_newton", bound, np.inf, information)
-    meat, blocks = _block_scores(found, free)
-    prior = found.prior[np.ix_(free, free)]
-    covariance[np.ix_(free, free)] = inverse @ (meat + prior) @ inverse
-    return Uncertainty(covariance, "sandwich", bound, float(blocks - 1), information)
+    scores = _block_scores(found, free)
+    reach, prior = told @ scores.T, found.prior[np.ix_(free, free)]
+    covariance[np.ix_(free, free)] = reach @ reach.T + told @ prior @ told + untold
+    return Uncertainty(covariance, "sandwich", bound, float(len(scores) - 1), information)
 
 
 def _density_weight(found: Influence) -> FloatArray:
@@ -89,17 +91,22 @@ def _density_weight(found: Influence) -> FloatArray:
     return np.full(r.size, 2.0 * density)
 
 
-def _inverse(matrix: FloatArray) -> FloatArray:
-    """Invert a scaled information matrix; directions without information get a huge variance."""
+def _inverse(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the inverse of an information matrix in two parts: directions with information, and those without.
+
+    The latter get a huge variance. No score varies along them, so that a sandwich would find them known.
+    """
     own = np.diag(matrix)
     size = np.sqrt(np.where(own > 0, own, NO_INFORMATION))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    values = np.maximum(values, 1e-14)
-    return (vectors / values) @ vectors.T / np.outer(size, size)
+    variances = 1.0 / np.maximum(values, SMALLEST_INFORMATION)
+    told = np.where(values > UNTOLD, variances, 0.0)
+    untold, scale = variances - told, np.outer(size, size)
+    return (vectors * told) @ vectors.T / scale, (vectors * untold) @ vectors.T / scale
 
 
-def _block_scores(found: Influence, free: BoolArray) -> tuple[FloatArray, int]:
-    """Return the sum of outer products of block scores, corrected for the number of blocks, and that number."""
+def _block_scores(found: Influence, free: BoolArray) -> FloatArray:
+    """Return (blocks, parameters) centred sums of scores, scaled so that their outer products sum to their variance."""
     scores = found.jacobian[:, free] * found.score_weight[:, None]
     recordings = np.unique(found.recording)
     length = _correlation_rows(found)
@@ -111,7 +118,7 @@ def _block_scores(found: Influence, free: BoolArray) -> tuple[FloatArray, int]:
     stacked = np.array(blocks)
     count = stacked.shape[0]
     centred = stacked - stacked.mean(axis=0)
-    return centred.T @ centred * count / (count - 1), count
+    return centred * np.sqrt(count / (count - 1))
 
 
 def _correlation_rows(found: Influence) -> float:

@@ -18,12 +18,15 @@ from friction_ocp.problem_file.schema import ProblemSection
 _DIRECTIONS = ("positive", "negative")
 
 
-def dump_problem(source: str | Path, values: Mapping[str, float], folder: str | Path) -> str:
+def dump_problem(
+    source: str | Path, values: Mapping[str, float], folder: str | Path, max_step: float | None = None
+) -> str:
     """Return the text of a problem file for `folder`: the file `source` with fitted values as its guesses.
 
     Bounds stay, and a prior stays where it was: its mean is written out. The value of one recording, named
     `path@recording`, becomes a `set` beside its file, the guess being left alone. Paths of recordings are written
-    relative to `folder`. Comments other than those at the head are lost. Raises FrictionOcpError for a name that is
+    relative to `folder`. `max_step` s is the integrator step that the values belong to, unless the file states one.
+    Comments other than those at the head are lost. Raises FrictionOcpError for a name that is
     not fitted in the file.
     """
     source = Path(source)
@@ -43,6 +46,8 @@ def dump_problem(source: str | Path, values: Mapping[str, float], folder: str | 
     for path in fitted.keys() & values.keys():
         _replace_guess(fitted[path], values[path])
     _rewrite_recordings(content, source, Path(folder), values)
+    if max_step is not None:
+        content["estimation"] = {"max_step": max_step} | (content.get("estimation") or {})
     return dump_document(content, document.head)
 
 

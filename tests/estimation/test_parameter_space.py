@@ -12,6 +12,7 @@ from axes import axis, problem, still_recording, two_masses
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space, parameter_space
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.friction.static import CoulombViscous, Polyline, Quadratic, Stribeck
@@ -103,10 +104,12 @@ def test_constraints_are_margins_with_their_slopes() -> None:
     assert np.asarray(slopes) == pytest.approx(np.array([[1.0, -2.0]]))
 
 
-def test_nothing_to_fit_is_an_error() -> None:
-    """A problem without any guess is told what a guess is."""
+def test_nothing_to_fit_is_an_error_of_the_fit_alone() -> None:
+    """A problem without any guess has an empty space, can be simulated, and is told by identify what a guess is."""
+    known = problem(axis())
+    assert space_of(known).names == ()
     with pytest.raises(FrictionOcpError, match=r"nothing to fit; a parameter with \{guess: ...\} is fitted"):
-        space_of(problem(axis()))
+        identify(known)
 
 
 def test_a_moved_start_leaves_priors_and_bounds() -> None:

@@ -23,7 +23,7 @@ def something_is_fitted(case: Case) -> Iterator[Finding]:
     """An identification has at least one parameter with a guess."""
     if not any(isinstance(leaf.value, Free) for leaf in case.leaves.values()):
         what = "nothing to fit: every number is known"
-        yield Finding(case.at("drive"), what, "a parameter with {guess: ...} is fitted")
+        yield Finding(case.at("drive"), what, "a parameter with {guess: ...} is fitted", severity="warning")
 
 
 def friction_is_seen_in_both_directions(case: Case) -> Iterator[Finding]:
