@@ -36,6 +36,9 @@ RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
 SHARES = (0.3, 1.0)
 """Stribeck parts over the Coulomb friction from which the released parameters start."""
+FOLLOWED = 3
+"""Distinct ends of the relaxed fit that are continued on free runs."""
+SAME = 1e-6
 AT_NOISE = 1.5
 """Mean square error over the noise floor up to which a fit needs no rivals."""
 HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
@@ -82,16 +85,30 @@ def _fit_once(model: Model, phases: Phases) -> Fitted:
     held = is_held(model.problem.drive)
     stated = bool(model.problem.estimation.process_noise)
     first = Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
-    fitted = _hop(model, _staged(model, first, phases), phases)
+    ends = _staged(model, first, phases)
     if held or not fits_free_run(model):
-        return fitted
+        return _hop(model, ends[0], phases)
+    grown = [_grow(model, fitted, _longest(model, span), phases) for fitted in _distinct(ends)[:FOLLOWED]]
+    return min(grown, key=lambda fitted: fitted.solution.objective)
+
+
+def _grow(model: Model, fitted: Fitted, horizon_s: float, phases: Phases) -> Fitted:
+    """Continue a relaxed fit on free runs over growing windows."""
     for share in GROWTH:
-        grown = windowed(_longest(model, span) * share)
-        program = grown(model, 0.0, fitted.program.loss)
+        program = windowed(horizon_s * share)(model, 0.0, fitted.program.loss)
         watch = phases.begin(f"free run over {share:.0%} of the horizon")
         solution = final_solver(model)(program, _carried(fitted, program), _limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     return fitted
+
+
+def _distinct(ends: Sequence[Fitted]) -> list[Fitted]:
+    """Drop ends that coincide with a better one: their objectives agree to SAME, relative."""
+    kept: list[Fitted] = []
+    for end in ends:
+        if all(end.solution.objective > (1.0 + SAME) * other.solution.objective for other in kept):
+            kept.append(end)
+    return kept
 
 
 @dataclass(frozen=True)
@@ -139,10 +156,10 @@ def _carried(fitted: Fitted, program: Program) -> Point:
     return Point(fitted.solution.point.theta, tuple(nodes))
 
 
-def _staged(model: Model, plan: Plan, phases: Phases) -> Fitted:
+def _staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     """Fit from the starts at hand; where none ends at the noise floor and there is a simpler model, fit that first.
 
-    The full model then starts from several releases of what the simpler one leaves out.
+    Return the ends, best first. The full model then starts from several releases of what the simpler one leaves out.
     """
     simple = nested_space(model.problem, model.space)
     plain = _plain_starts(model, phases)
@@ -151,11 +168,11 @@ def _staged(model: Model, plan: Plan, phases: Phases) -> Fitted:
     exact = replace(plan, widths=RELEASED_WIDTHS)
     if plan.conclusive and model.problem.estimation.loss == "squares":
         direct = _rounds(model, exact, plain[1:], "direct fit", phases)
-        if _at_noise(direct.program, direct.solution):
+        if _at_noise(direct[0].program, direct[0].solution):
             return direct
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
-    return _rounds(model, exact, released(model, simple, nested.solution.point.theta), "fit", phases)
+    return _rounds(model, exact, released(model, simple, nested[0].solution.point.theta), "fit", phases)
 
 
 def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
@@ -178,8 +195,11 @@ def _predicted(model: Model, phases: Phases) -> FloatArray:
     return solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")).point.theta
 
 
-def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> Fitted:
-    """Sharpen width and loss round by round; after each the worse half of the starts drops out, down to a few."""
+def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> list[Fitted]:
+    """Sharpen width and loss round by round; after each the worse half of the starts drops out, down to a few.
+
+    Return the ends, best first; the iterations of all are booked on each.
+    """
     program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
     points.sort(key=lambda point: mean_error(program, point))
@@ -195,7 +215,7 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
             ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
         iterations += sum(end.iterations for end in ends)
-    return Fitted(replace(ends[0], iterations=iterations), program)
+    return [Fitted(replace(end, iterations=iterations), program) for end in ends]
 
 
 def _hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
@@ -204,14 +224,17 @@ def _hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     if not isinstance(program.loss, Absolute):
         return fitted
     rng = np.random.default_rng(model.problem.estimation.seed)
-    coarse = replace(program, loss=Absolute(ROUNDINGS[-2] * mean_error(program, best.point)))
+    size = mean_error(program, best.point)
+    softer = [replace(program, loss=Absolute(rounding * size)) for rounding in ROUNDINGS[2:-1]]
     for k, hop in enumerate(HOPS):
         watch = phases.begin(f"hop {k + 1} of {len(HOPS)}")
         reduced = reduce_system(program.linearise(best.point), 1e-6)
         step = _on_ellipsoid(reduced.hessian, 2.0 * hop * best.objective, rng)
         theta = model.space.clip(best.point.theta + step)
         nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
-        point = solve_gauss_newton(coarse, Point(theta, nodes), COARSE, watch).point
+        point = Point(theta, nodes)
+        for stage in softer:
+            point = solve_gauss_newton(stage, point, COARSE, watch).point
         end = solve_gauss_newton(program, point, _limits(model), watch)
         iterations += end.iterations
         best = min(best, end, key=lambda solution: solution.objective)

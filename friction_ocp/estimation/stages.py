@@ -14,7 +14,7 @@ from friction_ocp.estimation.program import Point, Program, Segments
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 PREDICTION_SAMPLES = 20
-ROUNDINGS = (1.0, 0.2, 0.05, 0.01)
+ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)
 """Rounding of the absolute loss over the mean error, stage by stage."""
 WIDTHS = (0.1, 0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the

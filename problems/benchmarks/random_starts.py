@@ -166,7 +166,16 @@ def run_problem(problem: Path, starts: int, seed: int, pool: ProcessPoolExecutor
     return summary
 
 
-HEADER = ("problem", "same objective", "and parameters", "converged", "worst excess", "median s", "worst s")
+HEADER = (
+    "problem",
+    "best objective",
+    "same objective",
+    "and parameters",
+    "converged",
+    "worst excess",
+    "median s",
+    "worst s",
+)
 
 
 def row(item: Summary) -> tuple[str, ...]:
@@ -174,6 +183,7 @@ def row(item: Summary) -> tuple[str, ...]:
     counts = (item.same_objective, item.successes, item.converged)
     return (
         item.problem,
+        f"{item.best:.6g}",
         *(f"{count} of {item.starts}" for count in counts),
         f"{100 * item.worst_excess:.2f} %",
         f"{item.median_seconds:.2f}",
