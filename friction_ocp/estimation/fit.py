@@ -60,8 +60,9 @@ class Fitted:
 def fit(model: Model, progress: Progress = silent) -> Fitted:
     """Fit the parameters of a problem from its guesses.
 
-    A drive that something holds is fitted on its free run at once. One that drifts is fitted on relaxed segments
-    first, and on free runs over growing windows after that, where free runs are asked for.
+    A drive that something holds is fitted on its free run at once. One that drifts is fitted on free runs over growing
+    windows, where free runs are asked for: from short predictions and, unless that ends at the noise, from the best
+    ends of a fit on relaxed segments.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     models = [replace(model, space=model.space.moved(start)) for start in start_points(model)]
@@ -85,10 +86,13 @@ def _fit_once(model: Model, phases: Phases) -> Fitted:
     held = is_held(model.problem.drive)
     stated = bool(model.problem.estimation.process_noise)
     first = Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
-    ends = _staged(model, first, phases)
     if held or not fits_free_run(model):
-        return _hop(model, ends[0], phases)
-    grown = [_grow(model, fitted, _longest(model, span), phases) for fitted in _distinct(ends)[:FOLLOWED]]
+        return _hop(model, _staged(model, first, phases)[0], phases)
+    direct = _grow(model, _prediction(model, phases), _longest(model, span), phases)
+    if _is_noise(direct):
+        return direct
+    ends = _distinct(_staged(model, first, phases))[:FOLLOWED]
+    grown = [direct, *(_grow(model, fitted, _longest(model, span), phases) for fitted in ends)]
     return min(grown, key=lambda fitted: fitted.solution.objective)
 
 
@@ -189,10 +193,14 @@ def final_solver(model: Model) -> Solve:
 
 
 def _predicted(model: Model, phases: Phases) -> FloatArray:
-    """Return the parameters that best predict the smoothed motion over short times."""
+    return _prediction(model, phases).solution.point.theta
+
+
+def _prediction(model: Model, phases: Phases) -> Fitted:
+    """Fit what best predicts the smoothed motion over short times."""
     program = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
-    return solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")).point.theta
+    return Fitted(solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")), program)
 
 
 def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> list[Fitted]:
@@ -265,6 +273,14 @@ def _at_noise(program: Program, end: Solution) -> bool:
         return False
     samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
     return end.objective <= 0.5 * samples * AT_NOISE
+
+
+def _is_noise(fitted: Fitted) -> bool:
+    """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
+    if not isinstance(fitted.program.loss, Squares):
+        return False
+    samples = sum(int(np.isfinite(item.measured).sum()) for item in fitted.program.experiments)
+    return fitted.solution.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
 
 
 def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:
