@@ -45,8 +45,8 @@ HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks: by what share the quadratic model calls them worse."""
 FINALISTS = 5
 """Starts that are followed to the end."""
-RELEASES = (0.02, 0.04, 0.2, 1.0)
-"""Stribeck and break speeds, over the typical speed of the drive, from which the released parameters start."""
+RELEASES = ((0.02, 0.3), (0.04, 0.6), (0.2, 1.0), (1.0, 1.5))
+"""Stribeck speeds and highest break speeds, over the typical speed of the drive, from which released parameters start."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     """Fit the parameters of a problem from its guesses.
 
     A drive that something holds is fitted on its free run at once. One that drifts is fitted on free runs over growing
-    windows, where free runs are asked for: from short predictions and, unless that ends at the noise, from the best
-    ends of a fit on relaxed segments.
+    windows, where free runs are asked for: from short predictions and, unless that ends at the noise and the friction
+    has no part that is hard to start, from the best ends of a fit on relaxed segments.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     models = [replace(model, space=model.space.moved(start)) for start in start_points(model)]
@@ -89,7 +89,7 @@ def _fit_once(model: Model, phases: Phases) -> Fitted:
     if held or not fits_free_run(model):
         return _hop(model, _staged(model, first, phases)[0], phases)
     direct = _grow(model, _prediction(model, phases), _longest(model, span), phases)
-    if _is_noise(direct):
+    if _is_noise(direct) and nested_space(model.problem, model.space) is model.space:
         return direct
     ends = _distinct(_staged(model, first, phases))[:FOLLOWED]
     grown = [direct, *(_grow(model, fitted, _longest(model, span), phases) for fitted in ends)]
@@ -293,10 +293,10 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     speed = float(np.max(model.speed_scale[:-1]))
     starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
     shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
-    for place in RELEASES:
+    for place, highest_break in RELEASES:
         for share in shares:
             values = [
-                _released_value(model.space, name, known, place, share, speed, starts[0][k])
+                _released_value(model.space, name, known, (place, highest_break), share, speed, starts[0][k])
                 for k, name in enumerate(model.space.names)
             ]
             starts.append(np.array(values))
@@ -304,10 +304,16 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
 
 
 def _released_value(
-    space: ParameterSpace, name: str, known: dict[str, float], place: float, share: float, speed: float, default: float
+    space: ParameterSpace,
+    name: str,
+    known: dict[str, float],
+    places: tuple[float, float],
+    share: float,
+    speed: float,
+    default: float,
 ) -> float:
     """Return a start that leaves the friction at the typical speed as the nested model has it."""
-    stem, _, last = name.partition("@")[0].rpartition(".")
+    (place, highest_break), (stem, _, last) = places, name.partition("@")[0].rpartition(".")
     if ".tau_s" in name:
         return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
     if name.endswith(".load.stribeck"):
@@ -318,7 +324,7 @@ def _released_value(
         return place * speed
     if stem.endswith(".breaks"):
         breaks = sum(other.startswith(f"{stem}.") for other in space.names)
-        return 2.0 * place * speed * (int(last) + 1) / (breaks + 1)
+        return highest_break * speed * (int(last) + 1) / breaks
     if stem.endswith(".slopes"):
         return known.get(f"{stem}.0", default)
     return default

@@ -44,7 +44,7 @@ from friction_ocp.recording.recording import Channel, Recording
 
 SECONDS, RATE = 4.0, 1000.0
 TORQUE_CONSTANT, MOTOR_INERTIA, LOAD_INERTIA, RATIO = 0.35, 0.002, 4.0, 50.0
-STIFFNESS, DAMPING = 2.0e4, 20.0
+STIFFNESS, DAMPING, LOAD_VISCOUS = 2.0e4, 20.0, 5.0
 ENCODER_NOISE = {"motor": 1.0e-2, "load": 2.0e-4}
 
 TRUTH: dict[str, dict[str, Any]] = {
@@ -83,7 +83,7 @@ def make_plant(case: Case) -> Plant:
     sensors = [PlantSensor("motor_position", "motor.theta", period=1 / RATE, noise_std=ENCODER_NOISE["motor"])]
     shafts, transmissions = [motor], []
     if case.masses == 2:
-        shafts.append(PlantShaft("load", LOAD_INERTIA, PlantFriction("viscous", viscous=0.5)))
+        shafts.append(PlantShaft("load", LOAD_INERTIA, PlantFriction("viscous", viscous=LOAD_VISCOUS)))
         transmissions.append(PlantTransmission("motor", "load", ratio=RATIO, stiffness=STIFFNESS, damping=DAMPING))
         sensors.append(PlantSensor("load_position", "load.theta", period=1 / RATE, noise_std=ENCODER_NOISE["load"]))
     return Plant(
@@ -129,7 +129,7 @@ def make_problem(
         Sensor("motor_position", "motor.theta", noise_std=ENCODER_NOISE["motor"]),
     ]
     if case.masses == 2:
-        viscous = friction_laws()["viscous"](viscous=free("load.friction.viscous", 0.5))  # pyright: ignore[reportCallIssue]
+        viscous = friction_laws()["viscous"](viscous=free("load.friction.viscous", LOAD_VISCOUS))  # pyright: ignore[reportCallIssue]
         shafts.append(Shaft("load", free("load.inertia", LOAD_INERTIA), FrictionElement(viscous)))
         stiffness = free("motor-load.stiffness", STIFFNESS)
         damping = free("motor-load.damping", DAMPING)
