@@ -12,9 +12,10 @@ from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, so
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.losses import Absolute, AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
+from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases, Progress, silent
+from friction_ocp.estimation.release import released
 from friction_ocp.estimation.stages import (
     ROUNDINGS,
     WIDTHS,
@@ -34,8 +35,6 @@ GROWTH = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Windows of a free run over its horizon, one after another, for a drive that drifts."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
-SHARES = (0.3, 1.0)
-"""Stribeck parts over the Coulomb friction from which the released parameters start."""
 FOLLOWED = 3
 """Distinct ends of the relaxed fit that are continued on free runs."""
 SAME = 1e-6
@@ -45,8 +44,6 @@ HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks: by what share the quadratic model calls them worse."""
 FINALISTS = 5
 """Starts that are followed to the end."""
-RELEASES = ((0.02, 0.3), (0.04, 0.6), (0.2, 1.0), (1.0, 1.5))
-"""Stribeck speeds and highest break speeds, over the typical speed of the drive, from which released parameters start."""
 
 
 @dataclass(frozen=True)
@@ -281,54 +278,3 @@ def _is_noise(fitted: Fitted) -> bool:
         return False
     samples = sum(int(np.isfinite(item.measured).sum()) for item in fitted.program.experiments)
     return fitted.solution.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
-
-
-def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:
-    """Return starts of the full model around the answer of the nested one.
-
-    What the nested model does not have starts from the guess, and from several places in the range of speeds with
-    Stribeck parts of several sizes.
-    """
-    known = dict(zip(simple.names, theta, strict=True))
-    speed = float(np.max(model.speed_scale[:-1]))
-    starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
-    shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
-    for place, highest_break in RELEASES:
-        for share in shares:
-            values = [
-                _released_value(model.space, name, known, (place, highest_break), share, speed, starts[0][k])
-                for k, name in enumerate(model.space.names)
-            ]
-            starts.append(np.array(values))
-    return [model.space.clip(start) for start in starts]
-
-
-def _released_value(
-    space: ParameterSpace,
-    name: str,
-    known: dict[str, float],
-    places: tuple[float, float],
-    share: float,
-    speed: float,
-    default: float,
-) -> float:
-    """Return a start that leaves the friction at the typical speed as the nested model has it."""
-    (place, highest_break), (stem, _, last) = places, name.partition("@")[0].rpartition(".")
-    if ".tau_s" in name:
-        return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
-    if name.endswith(".load.stribeck"):
-        return share * known.get(f"{stem}.coulomb", default)
-    if name in known:
-        return (1.0 - share * min(1.0, place)) * known[name] if _is_coulomb(name) else known[name]
-    if ".omega_s" in name:
-        return place * speed
-    if stem.endswith(".breaks"):
-        breaks = sum(other.startswith(f"{stem}.") for other in space.names)
-        return highest_break * speed * (int(last) + 1) / breaks
-    if stem.endswith(".slopes"):
-        return known.get(f"{stem}.0", default)
-    return default
-
-
-def _is_coulomb(name: str) -> bool:
-    return ".friction.tau_c" in name or name.endswith(".friction.load.coulomb")

@@ -9,9 +9,10 @@ import pytest
 from axes import axis, measured_axis, problem, still_recording
 
 from friction_ocp.estimation.estimate import identify
-from friction_ocp.estimation.fit import RELEASES, SHARES, fit, released, start_points
+from friction_ocp.estimation.fit import fit, start_points
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.parameter_space import nested_space
+from friction_ocp.estimation.release import RELEASES, SHARES, released
 from friction_ocp.friction.static import CoulombViscous, Polyline, Stribeck
 from friction_ocp.parameters import Free
 

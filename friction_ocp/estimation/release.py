@@ -1,0 +1,65 @@
+"""Starts of a full model around the answer of its nested one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.simulation.grid import FloatArray
+
+SHARES = (0.3, 1.0)
+"""Stribeck parts over the Coulomb friction from which the released parameters start."""
+RELEASES = ((0.02, 0.3), (0.04, 0.6), (0.2, 1.0), (1.0, 1.5))
+"""Pairs of Stribeck speed and highest break speed, over the typical speed, from which released parameters start."""
+
+
+def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:
+    """Return starts of the full model around the answer of the nested one.
+
+    What the nested model does not have starts from the guess, and from several places in the range of speeds with
+    Stribeck parts of several sizes.
+    """
+    known = dict(zip(simple.names, theta, strict=True))
+    speed = float(np.max(model.speed_scale[:-1]))
+    starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
+    shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
+    for place, highest_break in RELEASES:
+        for share in shares:
+            values = [
+                _released_value(model.space, name, known, (place, highest_break), share, speed, starts[0][k])
+                for k, name in enumerate(model.space.names)
+            ]
+            starts.append(np.array(values))
+    return [model.space.clip(start) for start in starts]
+
+
+def _released_value(
+    space: ParameterSpace,
+    name: str,
+    known: dict[str, float],
+    places: tuple[float, float],
+    share: float,
+    speed: float,
+    default: float,
+) -> float:
+    """Return a start that leaves the friction at the typical speed as the nested model has it."""
+    (place, highest_break), (stem, _, last) = places, name.partition("@")[0].rpartition(".")
+    if ".tau_s" in name:
+        return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
+    if name.endswith(".load.stribeck"):
+        return share * known.get(f"{stem}.coulomb", default)
+    if name in known:
+        return (1.0 - share * min(1.0, place)) * known[name] if _is_coulomb(name) else known[name]
+    if ".omega_s" in name:
+        return place * speed
+    if stem.endswith(".breaks"):
+        breaks = sum(other.startswith(f"{stem}.") for other in space.names)
+        return highest_break * speed * (int(last) + 1) / breaks
+    if stem.endswith(".slopes"):
+        return known.get(f"{stem}.0", default)
+    return default
+
+
+def _is_coulomb(name: str) -> bool:
+    return ".friction.tau_c" in name or name.endswith(".friction.load.coulomb")
