@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +11,15 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, Simulation
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
+from friction_ocp.whole_file import whole_file
 
 Arrays = dict[str, dict[str, dict[str, Any]]]
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file under a temporary name and rename it when it is complete."""
-    staged = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        write(staged)
-        staged.replace(path)
-    finally:
-        staged.unlink(missing_ok=True)
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    with whole_file(path) as staged:
+        staged.write_text(text, encoding="utf-8")
 
 
 def save(result: Estimate | Simulation, folder: str | Path) -> Path:
@@ -60,10 +56,10 @@ def write_results(
 
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=1, allow_nan=False)
-    write_whole(folder / "result.json", lambda path: path.write_text(text, encoding="utf-8"))
+    write_text(folder / "result.json", text)
     write_result_series(folder / "result.h5", series)
     if fitted is not None:
-        write_whole(folder / "fitted.yaml", lambda path: path.write_text(fitted, encoding="utf-8"))
+        write_text(folder / "fitted.yaml", fitted)
     arrays = plain_arrays(series)
     write_report(document, arrays, folder / "report.html")
     write_figures(document, arrays, folder / "figures")

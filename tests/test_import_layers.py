@@ -13,7 +13,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "friction_ocp"
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors",),
+    ("errors", "whole_file"),
     ("quantities", "parameters", "expressions", "dae"),
     ("friction",),
     ("drive",),

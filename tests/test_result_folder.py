@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import h5py
 import numpy as np
@@ -18,7 +18,8 @@ from friction_ocp.estimation.estimate import Estimate, Simulation, identify, sim
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_result_series
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
-from friction_ocp.result_folder import fitted_problem, plain_arrays, write_whole
+from friction_ocp.result_folder import fitted_problem, plain_arrays
+from friction_ocp.whole_file import whole_file
 
 QUESTION = "how stiff the grease is."
 RESULT: dict[str, Any] = {
@@ -167,12 +168,10 @@ def test_a_file_is_renamed_into_place_when_it_is_complete(tmp_path: Path) -> Non
     path = tmp_path / "result.json"
     path.write_text("old", encoding="utf-8")
 
-    def write(staged: Path) -> None:
+    with whole_file(path) as staged:
         staged.write_text("new", encoding="utf-8")
         assert path.read_text(encoding="utf-8") == "old"
         assert staged.parent == path.parent
-
-    write_whole(path, write)
     assert path.read_text(encoding="utf-8") == "new"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -182,11 +181,8 @@ def test_a_file_that_could_not_be_written_leaves_the_old_one(tmp_path: Path) -> 
     path = tmp_path / "result.json"
     path.write_text("old", encoding="utf-8")
 
-    def write(staged: Path) -> NoReturn:
+    with pytest.raises(KeyboardInterrupt), whole_file(path) as staged:
         staged.write_text("ha", encoding="utf-8")
         raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_whole(path, write)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]

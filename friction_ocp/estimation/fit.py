@@ -98,7 +98,8 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, phases: Phases) -> Fit
     for share in GROWTH:
         program = windowed(horizon_s * share)(model, 0.0, fitted.program.loss)
         watch = phases.begin(f"free run over {share:.0%} of the horizon")
-        solution = final_solver(model)(program, _carried(fitted, program), _limits(model), watch)
+        start = program.point_along(fitted.program, fitted.solution.point)
+        solution = final_solver(model)(program, start, _limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     return fitted
 
@@ -145,16 +146,6 @@ def _longest(model: Model, span: float | None) -> float:
     if span is not None:
         return span
     return max(float(item.grid.time[-1] - item.grid.time[0]) for item in model.train)
-
-
-def _carried(fitted: Fitted, program: Program) -> Point:
-    """Start windows from the states that the program before them went through."""
-    nodes: list[FloatArray] = []
-    for index, cut in enumerate(program.segments):
-        track = fitted.program.simulate(index, fitted.solution.point, with_states=True).states
-        assert track is not None
-        nodes.append(track[cut.first[:-1]])
-    return Point(fitted.solution.point.theta, tuple(nodes))
 
 
 def _staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:

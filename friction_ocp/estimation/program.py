@@ -110,6 +110,15 @@ class Program:
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         return np.asarray(value).T, by_active @ slope
 
+    def point_along(self, other: Program, at: Point) -> Point:
+        """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""
+        nodes: list[FloatArray] = []
+        for index, cut in enumerate(self.segments):
+            track = other.simulate(index, at, with_states=True).states
+            assert track is not None
+            nodes.append(track[cut.first[:-1]])
+        return Point(at.theta, tuple(nodes))
+
     def simulate(self, index: int, point: Point, derivatives: bool = False, with_states: bool = False) -> SweepResult:
         """Simulate the segments of one recording from their nodes."""
         return self.sweep.run_many([self._request(index, point, derivatives, with_states)])[0]

@@ -67,12 +67,7 @@ def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Progra
     """Start every window from the state that the relaxed program smooths out of the measurement."""
     smoother = relaxed(model, experiments, 0.0, Squares())
     solved = solve_nodes(smoother, Point(point.theta, smoother.suggested_nodes(point.theta)))
-    nodes: list[FloatArray] = []
-    for index in range(len(smoother.segments)):
-        track = smoother.simulate(index, solved, with_states=True).states
-        assert track is not None
-        nodes.append(track[program.segments[index].first[:-1]])
-    return replace(point, nodes=tuple(nodes))
+    return program.point_along(smoother, solved)
 
 
 def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:

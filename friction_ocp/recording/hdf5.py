@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import secrets
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from friction_ocp.recording.checks import (
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
 from friction_ocp.recording.result_series import RecordingSeries, datasets_of, series_of
 from friction_ocp.recording.static_points import COLUMNS, StaticPoints
+from friction_ocp.whole_file import whole_file
 
 h5py: Any = _h5py  # its own types are incomplete
 
@@ -271,15 +271,9 @@ def _reading(path: Path, expected: str) -> Generator[_Reader]:
 @contextmanager
 def _writing(path: Path, format_name: str) -> Generator[Any]:
     """Open a file under a temporary name, which becomes `path` once everything is written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        with h5py.File(temporary, "w", track_order=True) as file:
-            file.attrs["format"] = format_name
-            yield file
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(path) as staged, h5py.File(staged, "w", track_order=True) as file:
+        file.attrs["format"] = format_name
+        yield file
 
 
 def _write_dataset(file: Any, path: str, values: FloatArray, attributes: Mapping[str, str]) -> None:

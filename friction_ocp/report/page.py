@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from friction_ocp.plots.series import Series
 from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
 from friction_ocp.report.sentence import verdict_sentence
 from friction_ocp.report.tables import SPLITS, correlation_rows, fit_rows, fit_rows_by_recording, parameter_rows
+from friction_ocp.whole_file import whole_file
 
 _HERE = Path(__file__).parent
 
@@ -35,7 +35,9 @@ class EmbeddedRecording:
 
 def write_report(result: Json, series: Series, path: Path) -> None:
     """Write report.html in one step: a reader sees the old file or the whole new one."""
-    replace_file(path, render_report(result, series))
+    page = render_report(result, series)
+    with whole_file(path) as staged:
+        staged.write_text(page, encoding="utf-8", newline="\n")
 
 
 def render_report(result: Json, series: Series) -> str:
@@ -98,17 +100,6 @@ def render_page(template: str, context: Mapping[str, Any]) -> str:
         literal=Markup,  # for what embedded_json has made safe
         breakable=breakable,
     )
-
-
-def replace_file(path: Path, text: str) -> None:
-    """Write a text file under another name beside it and rename that, so that it is never half written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        draft.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(draft, path)  # noqa: PTH105
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
