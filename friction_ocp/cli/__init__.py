@@ -1,0 +1,44 @@
+"""The command line: the only package that prints, one module a group of commands."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+
+from friction_ocp.cli import checking, fitting, importing
+from friction_ocp.cli.options import DONE, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT, Parser
+from friction_ocp.errors import FrictionOcpError
+
+__all__ = ["DONE", "INTERRUPTED", "NOT_CONVERGED", "WRONG_INPUT", "main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    options = _parser().parse_args(arguments)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return options.run(options)
+    except FrictionOcpError as error:
+        for finding in error.findings:
+            print(finding, file=sys.stderr)
+        return WRONG_INPUT
+    except KeyboardInterrupt:
+        print(f"{options.command}: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="friction-ocp",
+        description="Finds the friction in a drive from its own logs.",
+        epilog="Exit status: 0 done, 1 the input is wrong, 2 the solver did not converge, 3 interrupted.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for group in (checking, fitting, importing):
+        group.add_commands(commands)
+    return parser

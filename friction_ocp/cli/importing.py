@@ -1,0 +1,37 @@
+"""`import`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from friction_ocp.cli.options import DONE
+from friction_ocp.errors import Finding, FrictionOcpError
+
+
+def add_commands(commands: Any) -> None:
+    """Add `import` to the parser."""
+    importing = commands.add_parser("import", help="turn a log into a recording")
+    importing.add_argument("file", type=Path)
+    importing.add_argument("--map", type=Path, help="YAML file that names columns and units")
+    importing.add_argument("--out", type=Path, help="recording to write, .h5")
+    importing.add_argument("--inspect", action="store_true", help="list what the file holds and stop")
+    importing.set_defaults(run=_import)
+
+
+def _import(options: argparse.Namespace) -> int:
+    from friction_ocp.recording.hdf5 import write_recording
+    from friction_ocp.recording.import_recording import import_recording, inspect_file
+
+    if options.inspect:
+        print(inspect_file(options.file))
+        return DONE
+    missing = [name for name in ("map", "out") if getattr(options, name) is None]
+    if missing:
+        raise FrictionOcpError(
+            [Finding("import", f"--{name} is missing", remedy="see friction-ocp import --help") for name in missing]
+        )
+    write_recording(import_recording(options.file, options.map), options.out)
+    print(f"Recording: {options.out}")
+    return DONE

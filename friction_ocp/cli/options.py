@@ -1,0 +1,73 @@
+"""What commands share: exit statuses, options, the output folder, what is shown at the end."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from friction_ocp.errors import Finding, FrictionOcpError
+
+if TYPE_CHECKING:
+    from friction_ocp.estimation.problem import Problem
+
+DONE, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 1, 2, 3
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints end as wrong input does; argparse's own status 2 means something else here."""
+
+    def error(self, message: str) -> NoReturn:
+        self.print_usage(sys.stderr)
+        self.exit(WRONG_INPUT, f"{self.prog}: {message}\n")
+
+
+def add_job(commands: Any, name: str, text: str, run: Callable[[argparse.Namespace], int]) -> None:
+    """Add a command that works on one problem and leaves an output folder."""
+    job = commands.add_parser(name, help=text)
+    job.add_argument("problem", type=Path)
+    job.add_argument("--out", type=Path, help="output folder; default results/<problem stem>-" + name)
+    job.add_argument("--json", action="store_true", help="result.json on standard output")
+    job.set_defaults(run=run)
+
+
+def output_folder(options: argparse.Namespace) -> Path:
+    """Return the output folder; refuse one that cannot be written before any work is done."""
+    folder: Path = options.out or Path("results") / f"{options.problem.stem}-{options.command}"
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise FrictionOcpError(Finding(str(folder), f"{there} is a file", "a folder, made where there is none"))
+    if not os.access(there, os.W_OK):
+        raise FrictionOcpError(Finding(str(folder), f"{there} may not be written to", remedy="give another --out"))
+    return folder
+
+
+def checked(options: argparse.Namespace) -> Problem:
+    """Load a problem; refuse errors, show warnings."""
+    from friction_ocp.problem_file.check import check
+    from friction_ocp.problem_file.load import load_problem
+
+    problem = load_problem(options.problem)
+    findings = check(problem)
+    errors = [finding for finding in findings if finding.severity == "error"]
+    if errors:
+        raise FrictionOcpError(errors)
+    for finding in findings:
+        print(f"warning: {finding}", file=sys.stderr)
+    return problem
+
+
+def show(options: argparse.Namespace, folder: Path) -> None:
+    """Print the result in an output folder: as it is, or in a few lines."""
+    text = (folder / "result.json").read_text(encoding="utf-8")
+    if options.json:
+        print(text)
+        return
+    from friction_ocp.report.text import summary
+
+    print(summary(json.loads(text)))
+    print(f"Report: {folder / 'report.html'}")
