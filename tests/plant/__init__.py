@@ -1,5 +1,14 @@
 """An independent simulator of drives that makes the test data; it shares no code with the package under test."""
 
+from .flaws import (
+    PlantAmplifier,
+    PlantEndStop,
+    PlantFrictionMemory,
+    PlantLoop,
+    PlantRipple,
+    PlantSaturation,
+    PlantWarmUp,
+)
 from .parts import PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission
 from .plant import Plant, PlantRun
 from .trajectories import (
@@ -15,13 +24,20 @@ from .trajectories import (
 
 __all__ = [
     "Plant",
+    "PlantAmplifier",
     "PlantController",
+    "PlantEndStop",
     "PlantFriction",
+    "PlantFrictionMemory",
+    "PlantLoop",
     "PlantMotor",
+    "PlantRipple",
     "PlantRun",
+    "PlantSaturation",
     "PlantSensor",
     "PlantShaft",
     "PlantTransmission",
+    "PlantWarmUp",
     "Trajectory",
     "chirp",
     "constant",

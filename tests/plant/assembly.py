@@ -160,8 +160,8 @@ def assemble_mechanics(shafts: Sequence[PlantShaft], transmissions: Sequence[Pla
         if part.ratio == 0 or part.backlash < 0:
             raise ValueError(f"{part.name}: ratio must not be 0 and backlash not negative")
         if np.isinf(part.stiffness):
-            if part.backlash > 0:
-                raise ValueError(f"{part.name}: backlash {part.backlash} needs a finite stiffness")
+            if part.backlash > 0 or part.cubic or any(part.second_stage) or part.loop or part.kinematic_error:
+                raise ValueError(f"{part.name}: backlash, stiffening, loop and kinematic error need a finite stiffness")
             rigid.append((i, j, part.ratio))
         else:
             joint.append((i, j))
@@ -188,14 +188,17 @@ def assemble_mechanics(shafts: Sequence[PlantShaft], transmissions: Sequence[Pla
     )
 
 
-def group_traits(mechanics: Mechanics, prescribed: Mapping[int, int]) -> np.ndarray:
-    """Return (g, 3): can stick, torque through a rigid joint matters, input of the prescribed speed or -1."""
+def group_traits(mechanics: Mechanics, prescribed: Mapping[int, int], added: Sequence[bool]) -> np.ndarray:
+    """Return (g, 3): can stick, torque through a rigid joint matters, input of the prescribed speed or -1.
+
+    `added` names the shafts to which an input adds dry friction.
+    """
     m = mechanics
     traits = np.zeros((m.group_inertia.size, 3), dtype=np.int64)
     traits[:, 2] = -1
     for i in range(m.law.size):
         breakaway = m.friction[i][:, [TAU_C, TAU_S, LOAD_C, LOAD_S]]
-        if m.law[i] == STATIC and np.any(breakaway != 0):
+        if m.law[i] == STATIC and (np.any(breakaway != 0) or added[i]):
             traits[m.group[i], 0] = 1
         if np.any(m.friction[i][:, [LOAD_C, LOAD_S, LOAD_V]] != 0):
             if np.any((m.parent == i) & (m.forward == 1)):
@@ -213,16 +216,25 @@ def group_traits(mechanics: Mechanics, prescribed: Mapping[int, int]) -> np.ndar
     return traits
 
 
-def check_step(mechanics: Mechanics, traits: np.ndarray, step: float) -> None:
-    """Refuse a step that is too long for a joint's natural frequency or damping."""
+def check_step(mechanics: Mechanics, traits: np.ndarray, step: float, extra: np.ndarray, bumper: np.ndarray) -> None:
+    """Refuse a step that is too long for the natural frequency or damping of a joint or a bumper.
+
+    `extra` is the stiffness of loops and second stages by joint.
+    """
     m = mechanics
     mobility = np.where(traits[:, 2] >= 0, 0.0, 1.0 / np.where(m.group_inertia > 0, m.group_inertia, 1.0))
-    for (i, j), (ratio, stiffness, damping, _) in zip(m.joint, m.elastic, strict=True):
+    for (i, j), (ratio, stiffness, damping, _), more in zip(m.joint, m.elastic, extra, strict=True):
         gi, gj = m.group[i], m.group[j]
         compliance = mobility[gi] * (m.scale[i] / ratio) ** 2 + mobility[gj] * m.scale[j] ** 2
-        rate = max(np.sqrt(stiffness * compliance), damping * compliance)
-        if step * rate > 0.3:
-            raise ValueError(f"plant: step {step} s is too long for a joint of {rate:.4g} 1/s; use {0.2 / rate:.2g} s")
+        _refuse_long_step(step, max(np.sqrt((stiffness + more) * compliance), damping * compliance), "joint")
+    for i, (_, _, stiffness, damping) in enumerate(bumper):
+        compliance = mobility[m.group[i]] * m.scale[i] ** 2
+        _refuse_long_step(step, max(np.sqrt(stiffness * compliance), damping * compliance), "bumper")
+
+
+def _refuse_long_step(step: float, rate: float, what: str) -> None:
+    if step * rate > 0.3:
+        raise ValueError(f"plant: step {step} s is too long for a {what} of {rate:.4g} 1/s; use {0.2 / rate:.2g} s")
 
 
 def motor_rows(

@@ -11,9 +11,16 @@ STATIC, BRISTLE, GMS = 0, 1, 2
 TAU_C, TAU_S, OMEGA_S, DELTA, VISCOUS, QUADRATIC, SIGMA0, SIGMA1, LOAD_C, LOAD_S, LOAD_V, PIECES = range(12)
 SLOPES, BREAKS, COLUMNS = 12, 20, 28
 CURRENT, TORQUE, VOLTAGE = 0, 1, 2
-THETA, OMEGA, ALPHA, MOTOR_CURRENT, MOTOR_TORQUE, MOTOR_VOLTAGE = range(6)
+THETA, OMEGA, ALPHA, MOTOR_CURRENT, MOTOR_TORQUE, MOTOR_VOLTAGE, _, MOTOR_COMMAND = range(8)
 P, PD, PI_VELOCITY, CASCADE, DUTY = range(5)
 SHAFTS, JOINTS, MOTORS, INPUTS, CONTROLLERS, SENSORS = 12, 12, 6, 24, 4, 32
+LOOPS, WAVES, AMPLIFIER_STEPS = 6, 96, 4096
+COGGING, TORQUE_RIPPLE, FRICTION_RIPPLE = 0, MOTORS, 2 * MOTORS
+VISCOUS_RIPPLE = FRICTION_RIPPLE + SHAFTS
+DISTURBANCE = VISCOUS_RIPPLE + SHAFTS
+KINEMATIC = DISTURBANCE + SHAFTS
+ECCENTRICITY = KINEMATIC + JOINTS
+PLACES = ECCENTRICITY + SENSORS
 
 FLOAT, INT = np.float64, np.int64
 
@@ -59,6 +66,18 @@ MODEL = np.dtype(
         ("sensor", INT, (SENSORS, 2)),  # signal code, shaft or motor
         ("scaling", FLOAT, (SENSORS, 3)),  # gain, offset, resolution
         ("sample", INT, (SENSORS + 1,)),  # offsets into the samples
+        ("wave", FLOAT, (WAVES, 3)),  # cosine, sine, wave number of every harmonic
+        ("wave_at", INT, (PLACES + 1,)),  # offsets into them by place
+        ("warm", FLOAT, (SHAFTS, 4)),  # time constant or 0, dry, viscous, power or 0
+        ("memory", FLOAT, (SHAFTS, 3)),  # share, scale, time constant
+        ("friction_input", INT, (SHAFTS, 2)),  # inputs of a factor on the friction and of added dry friction, or -1
+        ("bumper", FLOAT, (SHAFTS, 4)),  # low, high, stiffness or 0, damping
+        ("spring", FLOAT, (JOINTS, 4)),  # cubic, second stiffness, its twist, ratio error over the output angle
+        ("loops", INT, (JOINTS, 2)),  # count, smooth
+        ("loop", FLOAT, (JOINTS, LOOPS, 2)),  # torque, twist
+        ("amplifier", FLOAT, (MOTORS, 4)),  # rate limit, time constant, hysteresis share and width
+        ("amplifier_delay", INT, (MOTORS,)),  # steps
+        ("iron", FLOAT, (MOTORS, 3)),  # saturation: form or 0, current, sharpness
     ],
     align=True,
 )
@@ -72,13 +91,22 @@ STATE = np.dtype(
         ("memory", FLOAT, (SHAFTS,)),  # bristle rate or GMS level of the step
         ("force", FLOAT, (SHAFTS, 7)),  # applied, its slope, passed on, friction A, B, torque T, work space
         ("joint_torque", FLOAT, (JOINTS,)),
-        ("motor", FLOAT, (MOTORS, 8)),  # current, torque, voltage at start and end, mean voltage, inductive current
+        # current, torque, voltage at start and end, mean voltage, inductive current, command at start and end, kt
+        ("motor", FLOAT, (MOTORS, 11)),
         ("signal_at", INT, (INPUTS,)),
         ("signal_now", FLOAT, (INPUTS, 2)),  # start and end of the step
         ("command", FLOAT, (CONTROLLERS,)),
         ("loop", FLOAT, (CONTROLLERS, 3)),  # integral, previous readings
         ("counter", INT, (CONTROLLERS, 2)),  # next tick, next command to apply
         ("sensor_at", INT, (SENSORS, 2)),  # next sample, last one seen by a controller
+        ("clock", FLOAT, (1,)),  # time at mid step
+        ("factor", FLOAT, (SHAFTS, 3)),  # on dry and on viscous friction; dry friction added
+        ("warmth", FLOAT, (SHAFTS,)),
+        ("swing", FLOAT, (SHAFTS,)),  # filtered acceleration
+        ("slipped", FLOAT, (JOINTS, LOOPS)),
+        ("queue", FLOAT, (MOTORS, AMPLIFIER_STEPS, 2)),  # commands under way, at start and end of their step
+        ("amplified", FLOAT, (MOTORS, 2)),  # behind the rate limit, behind the lag
+        ("magnet", FLOAT, (MOTORS,)),
     ],
     align=True,
 )

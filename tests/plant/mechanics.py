@@ -60,8 +60,9 @@ def friction_line(m, st, i, omega, d, load, h):
     """Return A, B of the mean friction torque A + B omega_mid of a step; d is the direction at standstill."""
     q = m.friction[i, 0 if (omega > 0.0 or (omega == 0.0 and d > 0.0)) else 1]
     speed = abs(omega)
-    slope = q[VISCOUS] + q[LOAD_V] * load
-    top = level(q, speed, load)
+    dry, wet = st.factor[i, 0], st.factor[i, 1]
+    slope = wet * (q[VISCOUS] + q[LOAD_V] * load)
+    top = dry * level(q, speed, load) + st.factor[i, 2]
     if m.law[i] == BRISTLE:
         return bristle_line(m, st, i, omega, d, top, slope, h)
     if m.law[i] == GMS:
@@ -76,14 +77,14 @@ def friction_line(m, st, i, omega, d, load, h):
             else:
                 a += limit if force > 0.0 else -limit
         return a, slope
-    value = top + slope * speed + q[QUADRATIC] * speed * speed
-    slope += 2.0 * q[QUADRATIC] * speed
+    value = top + slope * speed + wet * q[QUADRATIC] * speed * speed
+    slope += 2.0 * wet * q[QUADRATIC] * speed
     start = 0.0
     for j in range(int(q[PIECES])):
         end = q[BREAKS + j]
-        value += q[SLOPES + j] * (min(speed, end) - start)
+        value += wet * q[SLOPES + j] * (min(speed, end) - start)
         if speed < end:
-            slope += q[SLOPES + j]
+            slope += wet * q[SLOPES + j]
             break
         start = end
     return d * value - slope * omega, slope

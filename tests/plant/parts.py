@@ -8,6 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from .flaws import (
+    PlantAmplifier,
+    PlantEndStop,
+    PlantFrictionMemory,
+    PlantLoop,
+    PlantRipple,
+    PlantSaturation,
+    PlantWarmUp,
+)
+
 Directional = float | tuple[float, float]
 """One value, or (positive, negative) by the direction of motion."""
 
@@ -44,18 +54,33 @@ class PlantFriction:
 
 @dataclass(frozen=True)
 class PlantShaft:
-    """A rotary or linear inertia; gravity is (torque, phase) of -torque sin(theta + phase)."""
+    """A rotary or linear inertia; gravity is (torque, phase) of -torque sin(theta + phase).
+
+    `ripple` over the angle is added to 1 in a factor on the dry friction, `viscous_ripple` in one on the rest.
+    `disturbance` is a torque over the time.
+    """
 
     name: str
     inertia: float
     friction: PlantFriction = PlantFriction()
     gravity: tuple[float, float] = (0.0, 0.0)
     external_torque: float = 0.0
+    ripple: PlantRipple | None = None
+    viscous_ripple: PlantRipple | None = None
+    disturbance: PlantRipple | None = None
+    warm_up: PlantWarmUp | None = None
+    memory: PlantFrictionMemory | None = None
+    end_stop: PlantEndStop | None = None
 
 
 @dataclass(frozen=True)
 class PlantTransmission:
-    """Joins two shafts; stiffness, damping and total free play on the output side, infinite stiffness is rigid."""
+    """Joins two shafts; stiffness, damping and total free play on the output side, infinite stiffness is rigid.
+
+    An elastic joint twisted by x beyond its play carries stiffness x + cubic x^3, beyond a twist `second_stage[1]` also
+    `second_stage[0]` N m/rad more, and its `loop`. twist = theta_in / ratio + kinematic_error - theta_out, the error
+    over theta_in or theta_out as `error_over` says; it does no work.
+    """
 
     from_shaft: str
     to_shaft: str
@@ -63,6 +88,11 @@ class PlantTransmission:
     stiffness: float = float("inf")
     damping: float = 0.0
     backlash: float = 0.0
+    cubic: float = 0.0
+    second_stage: tuple[float, float] = (0.0, 0.0)
+    loop: PlantLoop | None = None
+    kinematic_error: PlantRipple | None = None
+    error_over: Literal["input", "output"] = "input"
 
     @property
     def name(self) -> str:
@@ -75,7 +105,8 @@ class PlantMotor:
     """A motor on a shaft; its command is share * command + bias in the unit of `drive`.
 
     The command comes from the input `<name>.<drive>` or from `controller`. The input `<name>.enable` (default 1) cuts
-    current and torque below 0.5.
+    current and torque below 0.5. The command passes the `amplifier`. `cogging` is a torque over the angle;
+    `torque_ripple` over the angle is added to 1 in a factor on the torque constant.
     """
 
     name: str
@@ -87,6 +118,10 @@ class PlantMotor:
     share: float = 1.0
     bias: float = 0.0
     controller: str | None = None
+    cogging: PlantRipple | None = None
+    torque_ripple: PlantRipple | None = None
+    saturation: PlantSaturation | None = None
+    amplifier: PlantAmplifier | None = None
 
 
 @dataclass(frozen=True)
@@ -122,10 +157,11 @@ class PlantController:
 class PlantSensor:
     """recorded(t) = gain * true(t - delay) + offset + noise, rounded to `resolution`.
 
-    `measures` is `<shaft>.theta|omega|alpha`, `<motor>.current|torque|voltage`, or the name of any input, such as
-    `reference.theta` or `motor.enable`. alpha is the acceleration without the white torque noise, whose own variance is
-    infinite. `jitter` moves the sampling instants, `stamp_error` falsifies the recorded times (both standard
-    deviations, clipped at 0.4 periods, the latter at 0.05 where both act); `dropout` is the probability of a NaN.
+    `measures` is `<shaft>.theta|omega|alpha`, `<motor>.current|torque|voltage`, `<motor>.command` (before the
+    amplifier), or the name of any input, such as `reference.theta` or `motor.enable`. alpha is the acceleration
+    without the white torque noise, whose own variance is infinite. `jitter` moves the sampling instants, `stamp_error`
+    falsifies the recorded times (both standard deviations, clipped at 0.4 periods, the latter at 0.05 where both act);
+    `dropout` is the probability of a NaN. `eccentricity` over the angle is added to a true angle, its slope to a speed.
     """
 
     name: str
@@ -139,3 +175,4 @@ class PlantSensor:
     jitter: float = 0.0
     stamp_error: float = 0.0
     dropout: float = 0.0
+    eccentricity: PlantRipple | None = None

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from .assembly import Mechanics, assemble_mechanics, check_step, group_traits, motor_rows
+from .flaw_rows import added_stiffness, amplifier_rows, joint_rows, ripple_rows, shaft_rows
 from .layout import MODEL, STATE
 from .parts import PlantController, PlantMotor, PlantSensor, PlantShaft, PlantTransmission
 from .sampling import ControllerArrays, SensorArrays, collect, draw_samples, lay_out_controllers, lay_out_sensors
 from .stepping import run
 from .trajectories import Trajectory, TrajectoryLike, as_trajectory
 
+SHAFT_INPUTS = ("external_torque", "omega", "friction_factor", "added_coulomb")
 CHUNK = 1 << 15
 """Steps per kernel call; bounds the memory of the process noise."""
 
@@ -54,9 +56,11 @@ class Plant:
         """Simulate `duration` seconds.
 
         `inputs` are `<motor>.current|torque|voltage` (by its drive), `<motor>.enable`, `<shaft>.external_torque`,
-        `<shaft>.omega` (prescribes the speed), `reference.theta|omega`: a Trajectory, (time, values) held, or a number.
+        `<shaft>.omega` (prescribes the speed), `<shaft>.friction_factor`, `<shaft>.added_coulomb` (dry friction on top,
+        N m), `reference.theta|omega`: a Trajectory, (time, values) held, or a number.
         `process_noise` is the density of white torque per shaft in N m/sqrt(Hz): the speed of a free
-        inertia J gathers the variance density^2 t / J^2. `initial` is `<shaft>.theta|omega|z`. `truth_rate` in Hz.
+        inertia J gathers the variance density^2 t / J^2. `initial` is `<shaft>.theta|omega|z|warmth`.
+        `truth_rate` in Hz.
         """
         signals = {name: as_trajectory(value) for name, value in (inputs or {}).items()}
         self._check_names(signals, process_noise or {}, initial or {})
@@ -66,7 +70,8 @@ class Plant:
         loops = lay_out_controllers(self.controllers, drawn, signals, duration, step)
         model = _fill(MODEL, vars(mechanics) | vars(sensors) | vars(loops) | _tape_places(signals))
         model["truth_every"] = round(1.0 / (truth_rate * step)) if truth_rate > 0 else 0
-        self._connect(model, mechanics, list(signals), step, process_noise or {})
+        measured = [samples.sensor for samples in drawn if samples.place is not None]
+        self._connect(model, mechanics, list(signals), step, process_noise or {}, measured)
         state = _fill(STATE, {"signal_at": model["signal"][0, :-1], "sensor_at": model["sample"][0, :-1, None]})
         _start(self.shafts, mechanics, state, signals, initial or {})
         truth = self._run(model, state, sensors, loops, signals, duration, rng)
@@ -77,9 +82,9 @@ class Plant:
     ) -> None:
         shafts = [shaft.name for shaft in self.shafts]
         known = [f"{motor.name}.{signal}" for motor in self.motors for signal in (motor.drive, "enable")]
-        known += [f"{shaft}.{signal}" for shaft in shafts for signal in ("external_torque", "omega")]
+        known += [f"{shaft}.{signal}" for shaft in shafts for signal in SHAFT_INPUTS]
         known += [f"{c.reference}.{signal}" for c in self.controllers for signal in ("theta", "omega")]
-        states = [f"{shaft}.{signal}" for shaft in shafts for signal in ("theta", "omega", "z")]
+        states = [f"{shaft}.{signal}" for shaft in shafts for signal in ("theta", "omega", "z", "warmth")]
         for given, allowed, what in (
             (signals, known, "input"),
             (noise, shafts, "noise on"),
@@ -90,14 +95,24 @@ class Plant:
                     raise ValueError(f"plant: no {what} '{name}'; there are {', '.join(allowed)}")
 
     def _connect(
-        self, model: np.ndarray, mechanics: Mechanics, inputs: list[str], step: float, noise: Mapping[str, float]
+        self,
+        model: np.ndarray,
+        mechanics: Mechanics,
+        inputs: list[str],
+        step: float,
+        noise: Mapping[str, float],
+        sensors: list[PlantSensor],
     ) -> None:
         """Fill in what depends on the inputs and the step."""
         columns = {name: index for index, name in enumerate(inputs)}
         names = [shaft.name for shaft in self.shafts]
         prescribed = {i: columns[f"{name}.omega"] for i, name in enumerate(names) if f"{name}.omega" in columns}
-        traits = group_traits(mechanics, prescribed)
-        check_step(mechanics, traits, step)
+        joints = [part for part in self.transmissions if np.isfinite(part.stiffness)]
+        flaws = ripple_rows(self.shafts, joints, self.motors, sensors) | shaft_rows(self.shafts, columns)
+        flaws |= joint_rows(joints) | amplifier_rows(self.motors, step)
+        traits = group_traits(mechanics, prescribed, [f"{name}.added_coulomb" in columns for name in names])
+        extra = np.array([added_stiffness(part) for part in joints])
+        check_step(mechanics, traits, step, extra, np.asarray(flaws["bumper"]))
         motor, winding = motor_rows(self.motors, self.shafts, columns, [c.name for c in self.controllers])
         values = {
             "step": step,
@@ -113,7 +128,7 @@ class Plant:
             "external": [columns.get(f"{name}.external_torque", -1) for name in names],
             "noise_std": [noise.get(name, 0.0) / np.sqrt(step) for name in names],
         }
-        for name, value in values.items():
+        for name, value in (values | flaws).items():
             _put(model, name, value)
 
     def _run(
@@ -149,12 +164,6 @@ class Plant:
         names += [f"{motor.name}.current" for motor in self.motors]
         time = np.arange(truth.shape[0]) * (model["truth_every"][0] * model["step"][0])
         return {"time": time} | {name: truth[:, k].copy() for k, name in enumerate(names)}
-
-
-def _refuse_unknown(what: str, given: Iterable[str], allowed: list[str]) -> None:
-    for name in given:
-        if name not in allowed:
-            raise ValueError(f"plant: no {what} '{name}'; there are {', '.join(allowed)}")
 
 
 def _put(record: np.ndarray, name: str, value: object) -> None:
@@ -197,6 +206,8 @@ def _start(
         g, scale = mechanics.group[i], mechanics.scale[i]
         if signal == "z":
             state["bristle"][0, i, 0] = value
+        elif signal == "warmth":
+            state["warmth"][0, i] = value
         else:
             state[signal][0, g, :] = value / scale
 

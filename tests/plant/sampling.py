@@ -7,12 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .layout import ALPHA, CASCADE, DUTY, MOTOR_CURRENT, MOTOR_TORQUE, MOTOR_VOLTAGE, OMEGA, PD, PI_VELOCITY, THETA, P
+from .layout import (
+    ALPHA,
+    CASCADE,
+    DUTY,
+    MOTOR_COMMAND,
+    MOTOR_CURRENT,
+    MOTOR_TORQUE,
+    MOTOR_VOLTAGE,
+    OMEGA,
+    PD,
+    PI_VELOCITY,
+    THETA,
+    P,
+)
 from .parts import PlantController, PlantMotor, PlantSensor, PlantShaft
 from .trajectories import Trajectory
 
 SHAFT_SIGNALS = {"theta": THETA, "omega": OMEGA, "alpha": ALPHA}
-MOTOR_SIGNALS = {"current": MOTOR_CURRENT, "torque": MOTOR_TORQUE, "voltage": MOTOR_VOLTAGE}
+MOTOR_SIGNALS = {"current": MOTOR_CURRENT, "torque": MOTOR_TORQUE, "voltage": MOTOR_VOLTAGE, "command": MOTOR_COMMAND}
 TYPES = {"p": P, "pd": PD, "pi_velocity": PI_VELOCITY, "cascade": CASCADE, "duty": DUTY}
 SLACK = 1e-6
 """Share of a step by which a time may miss a grid point through rounding."""

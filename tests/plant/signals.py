@@ -6,7 +6,8 @@ import math
 
 from numba import njit
 
-from .layout import ALPHA, CASCADE, DUTY, MOTOR_CURRENT, OMEGA, PD, THETA
+from .flaw_kernels import wave
+from .layout import ALPHA, CASCADE, DUTY, ECCENTRICITY, MOTOR_CURRENT, OMEGA, PD, THETA
 
 
 @njit
@@ -87,6 +88,16 @@ def control(m, st, reference, issued, ready, recorded, n):
 
 
 @njit
+def eccentric(m, st, c, value, theta):
+    """Return the reading of an eccentric sensor: its angle ripples with the angle, its speed with the slope of that."""
+    if m.sensor[c, 0] == THETA:
+        return value + wave(m, ECCENTRICITY + c, value)[0]
+    if m.sensor[c, 0] == OMEGA:
+        return value * (1.0 + wave(m, ECCENTRICITY + c, theta)[1])
+    return value
+
+
+@njit
 def sense(m, st, step, fraction, recorded, n):
     """Record the samples that fall into step n; alpha lies mid step and is taken one step late."""
     h = m.step
@@ -106,6 +117,8 @@ def sense(m, st, step, fraction, recorded, n):
                 else:
                     value = st.alpha[g, 1] + (f - 0.5) * (st.alpha[g, 0] - st.alpha[g, 1])
                 value *= s
+                if m.wave_at[ECCENTRICITY + c] < m.wave_at[ECCENTRICITY + c + 1]:
+                    value = eccentric(m, st, c, value, s * st.theta[g, 2])
             else:
                 column = 2 * (kind - MOTOR_CURRENT)
                 value = st.motor[item, column] + f * (st.motor[item, column + 1] - st.motor[item, column])

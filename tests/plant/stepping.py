@@ -14,13 +14,25 @@ from pathlib import Path
 import numba
 from numba import njit
 
+from .flaw_kernels import (
+    amplify,
+    heat_up,
+    kinematic,
+    magnetised,
+    outside_torque,
+    ripple_torque,
+    saturated,
+    scale_friction,
+    settle_loops,
+    spring_torque,
+)
 from .layout import BREAKS, BRISTLE, CURRENT, GMS, PIECES, SLOPES, VOLTAGE
 from .mechanics import contact, demand, move
 from .signals import control, read_signals, sense
 
 
 @njit
-def drive_motors(m, st):
+def drive_motors(m, st, n):
     """Add the motor torques to their shafts, with the slope that back-EMF gives them."""
     for j in range(m.motors):
         i = m.motor[j, 0]
@@ -29,19 +41,31 @@ def drive_motors(m, st):
         begin = end = st.command[m.motor[j, 3]] if m.motor[j, 3] >= 0 else 0.0
         if m.motor[j, 2] >= 0:
             begin, end = st.signal_now[m.motor[j, 2], 0], st.signal_now[m.motor[j, 2], 1]
-        begin, end = share * begin + bias, share * end + bias
         row = st.motor[j]
         for k in range(7):
             row[k] = 0.0
+        row[8], row[9] = begin, end
+        begin, end = amplify(m, st, j, share * begin + bias, share * end + bias, n)
+        cogging, ripple = ripple_torque(m, st, j)
+        st.force[i, 0] += cogging
         if m.motor[j, 4] >= 0 and st.signal_now[m.motor[j, 4], 0] < 0.5:
             row[7] = 0.0
             continue
+        form, limit, sharpness = m.iron[j, 0], m.iron[j, 1], m.iron[j, 2]
         if m.motor[j, 1] != VOLTAGE:
-            factor = kt if m.motor[j, 1] == CURRENT else 1.0
-            row[0], row[1], row[2], row[3] = begin * factor / kt, end * factor / kt, begin * factor, end * factor
-            st.force[i, 0] += 0.5 * factor * (begin + end)
+            if m.motor[j, 1] != CURRENT:
+                begin, end = begin / kt, end / kt
+            row[0], row[1] = begin, end
+            begin, end = magnetised(m, st, j, begin, end)
+            row[2] = kt * ripple * saturated(form, limit, sharpness, begin)
+            row[3] = kt * ripple * saturated(form, limit, sharpness, end)
+            st.force[i, 0] += 0.5 * (row[2] + row[3])
             continue
         row[4], row[5], row[6] = begin, end, 0.5 * (begin + end)
+        kt *= ripple
+        if form > 0 and row[7] != 0.0:
+            kt *= saturated(form, limit, sharpness, row[7]) / row[7]
+        row[10] = kt
         x = resistance * m.step / inductance if inductance > 0.0 else math.inf
         phi = -math.expm1(-x) / x
         st.force[i, 0] += kt * (row[7] * phi + row[6] / resistance * (1.0 - phi))
@@ -56,8 +80,9 @@ def settle_motors(m, st):
             continue
         i = m.motor[j, 0]
         g, s = m.group[i], m.scale[i]
-        kt, resistance, inductance = m.winding[j, 0], m.winding[j, 1], m.winding[j, 2]
+        resistance, inductance = m.winding[j, 1], m.winding[j, 2]
         row = st.motor[j]
+        kt = row[10]
         if inductance > 0.0:
             row[0] = row[7]
             mean = s * (st.theta[g, 0] - st.theta[g, 1]) / m.step
@@ -66,6 +91,7 @@ def settle_motors(m, st):
         else:
             row[0] = (row[4] - kt * s * st.omega[g, 1]) / resistance
             row[1] = (row[5] - kt * s * st.omega[g, 0]) / resistance
+            row[7] = row[1]
         row[2], row[3] = kt * row[0], kt * row[1]
 
 
@@ -75,7 +101,8 @@ def load_shafts(m, st, noise):
     h = m.step
     for i in range(m.shafts):
         g = m.group[i]
-        torque = m.applied[i, 2]
+        scale_friction(m, st, i)
+        torque = m.applied[i, 2] + outside_torque(m, st, i)
         if m.applied[i, 0] != 0.0:
             torque -= m.applied[i, 0] * math.sin(m.scale[i] * st.theta[g, 2] + m.applied[i, 1])
         if m.external[i] >= 0:
@@ -88,12 +115,15 @@ def load_shafts(m, st, noise):
         i, j = m.joint[e, 0], m.joint[e, 1]
         ratio = m.elastic[e, 0]
         si, sj, gi, gj = m.scale[i] / ratio, m.scale[j], m.group[i], m.group[j]
-        rate = si * st.omega[gi, 2] - sj * st.omega[gj, 2]
-        middle = si * st.theta[gi, 2] - sj * st.theta[gj, 2]
+        error, over_in, over_out = kinematic(m, e, m.scale[i] * st.theta[gi, 2], sj * st.theta[gj, 2])
+        over_in += 1.0 / ratio
+        rate = over_in * m.scale[i] * st.omega[gi, 2] - (1.0 - over_out) * sj * st.omega[gj, 2]
+        middle = si * st.theta[gi, 2] + error - sj * st.theta[gj, 2]
         torque = contact(m.elastic[e], middle - 0.5 * h * rate, rate, h)
+        torque += spring_torque(m, st, e, middle, 0.5 * h * rate)
         st.joint_torque[e] = torque
-        st.force[j, 0] += torque
-        st.force[i, 2] += torque / ratio
+        st.force[j, 0] += torque * (1.0 - over_out)
+        st.force[i, 2] += torque * over_in
 
 
 @njit
@@ -131,6 +161,7 @@ def advance(m, st):
         for k in range(m.first[g], m.first[g + 1]):
             i = m.shaft[k]
             mean = m.scale[i] * travel / h
+            heat_up(m, st, i, mean)
             if m.law[i] == BRISTLE:
                 x = st.memory[i] * h
                 phi = 1.0 - 0.5 * x if x < 1e-4 else -math.expm1(-x) / x
@@ -183,11 +214,13 @@ def _run(model, state, signals, references, samples, recorded, truth, noise, beg
     for n in range(begin, end):
         read_signals(m, st, time, value, n)
         control(m, st, reference, issued, ready, recorded, n)
+        st.clock[0] = (n + 0.5) * m.step
         prepare(m, st)
         load_shafts(m, st, noise[min(n - begin, noise.shape[0] - 1)])
-        drive_motors(m, st)
+        drive_motors(m, st, n)
         advance(m, st)
         settle_motors(m, st)
+        settle_loops(m, st)
         sense(m, st, step, fraction, recorded, n)
         if m.truth_every > 0 and (n + 1) % m.truth_every == 0 and (n + 1) // m.truth_every < truth.shape[0]:
             keep_truth(m, st, truth[(n + 1) // m.truth_every])
@@ -196,7 +229,9 @@ def _run(model, state, signals, references, samples, recorded, truth, noise, beg
 def _compile():
     """Compile with a cache keyed by the text of all kernel files: numba itself looks only at the caller's file."""
     here = Path(__file__).parent
-    texts = [(here / f"{name}.py").read_bytes() for name in ("layout", "mechanics", "signals", "stepping")]
+    texts = [
+        (here / f"{name}.py").read_bytes() for name in ("layout", "flaw_kernels", "mechanics", "signals", "stepping")
+    ]
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(here / "__pycache__" / f"numba-{hashlib.sha256(b''.join(texts)).hexdigest()[:12]}")
     try:
