@@ -106,8 +106,17 @@ def leaves(part: Any, prefix: str, motion: str = "rotary") -> Iterator[Leaf]:
                 if leaf is not None and not isinstance(leaf, str):
                     nested = _nested_path(item, path, leaf_path)
                     yield Leaf(leaf_path, leaf, item.metadata["kind"], item.metadata["meaning"], motion, nested)
-        elif _is_part(value):
-            yield from leaves(value, path, motion)
+        else:
+            for part_path, inner in _parts(value, path):
+                yield from leaves(inner, part_path, motion)
+
+
+def _parts(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """Yield the part or the parts that a field holds, with their paths."""
+    items: list[tuple[str, Any]] = [(path, value)]
+    if isinstance(value, tuple):
+        items = [(f"{path}.{k}", item) for k, item in enumerate(value)]  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    yield from ((name, item) for name, item in items if _is_part(item))
 
 
 def _nested_path(item: dataclasses.Field[Any], path: str, leaf_path: str) -> str | float | None:
@@ -134,6 +143,8 @@ def bind(part: Part, prefix: str, values: Mapping[str, Any]) -> Part:
         value, path = getattr(part, item.name), _path(prefix, item)
         if "kind" in item.metadata:
             changes[item.name] = _bound(value, path, values)
-        elif _is_part(value):
-            changes[item.name] = bind(value, path, values)
+        else:
+            inner = [bind(one, name, values) for name, one in _parts(value, path)]
+            if inner:
+                changes[item.name] = tuple(inner) if isinstance(value, tuple) else inner[0]
     return dataclasses.replace(part, **changes)

@@ -80,7 +80,7 @@ def dae(drive: Drive, width: float) -> Dae:
 
 
 def _symbols(mech: Mechanism) -> _Symbols:
-    counts = (mech.angle_groups, mech.free_groups, mech.bristles, mech.extra_names)
+    counts = (mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names)
     names = iter(mech.state_names)
     angles, speeds, bristle, extra = (column([symbol(next(names)) for _ in part]) for part in counts)
     memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
@@ -99,7 +99,7 @@ def _friction(
     """Return the friction torque on every shaft, and the rates of the bristles."""
     friction: dict[str, Any] = {}
     rates: list[Any] = []
-    deflection = {shaft.name: symbols.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    deflection = mech.deflections(symbols.bristle)
     for shaft in mech.drive.shafts:
         omega, transmitted = mech.shaft_speed(shaft.name, at.v), transmitted_torque(mech, shaft, load)
         if shaft.name in deflection:
@@ -128,7 +128,7 @@ def _state_unit(drive: Drive, name: str) -> str:
     if drive.controller is not None and name.startswith("controller."):
         return command_unit(drive, drive.controller)
     part, _, signal = name.partition(".")
-    return si_unit("angle", drive.shaft(part).motion) if signal == "friction.z" else signal_unit(drive, name)
+    return si_unit("angle", drive.shaft(part).motion) if signal.startswith("friction.z") else signal_unit(drive, name)
 
 
 def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:

@@ -24,6 +24,12 @@ def symbol(name: str) -> ca.SX:
     return ca.SX.sym(name)
 
 
+def deflection_names(shaft: Shaft) -> tuple[str, ...]:
+    """Return the names of a shaft's bristle states: z, or z1, z2, ... where there are several."""
+    count = shaft.friction.law.bristle_count
+    return tuple(f"{shaft.name}.friction.z{k + 1 if count > 1 else ''}" for k in range(count))
+
+
 def column(items: list[Any]) -> ca.SX:
     """Stack scalars into an SX column; an empty list gives a (0, 1) column."""
     return ca.vertcat(*[ca.SX(item) for item in items]) if items else ca.SX(0, 1)
@@ -72,6 +78,17 @@ class Mechanism:
         return tuple(shaft for shaft in self.drive.shafts if shaft.friction.law.has_bristle)
 
     @property
+    def bristle_names(self) -> tuple[str, ...]:
+        """Names of the bristle states."""
+        return tuple(name for shaft in self.bristles for name in deflection_names(shaft))
+
+    def deflections(self, bristle: ca.SX) -> dict[str, Any]:
+        """Return the bristle states by shaft: (1,), or a column where a shaft has several."""
+        counts = [shaft.friction.law.bristle_count for shaft in self.bristles]
+        pieces = ca.vertsplit(bristle, [sum(counts[:k]) for k in range(len(counts) + 1)]) if counts else []
+        return {shaft.name: piece for shaft, piece in zip(self.bristles, pieces, strict=True)}
+
+    @property
     def extra_names(self) -> tuple[str, ...]:
         """Names of the continuous states beside motion and bristles."""
         names = [f"{motor.name}.current" for motor in self.drive.motors if self._has_winding_state(motor)]
@@ -92,7 +109,7 @@ class Mechanism:
         return (
             *(f"{roots[g]}.theta" for g in self.angle_groups),
             *(f"{roots[g]}.omega" for g in self.free_groups),
-            *(f"{shaft.name}.friction.z" for shaft in self.bristles),
+            *self.bristle_names,
             *self.extra_names,
             *self.memory_names,
         )

@@ -66,7 +66,7 @@ def _state(mech: Mechanism) -> _State:
     sizes = (
         len(mech.angle_groups),
         len(mech.free_groups),
-        len(mech.bristles),
+        len(mech.bristle_names),
         len(mech.extra_names),
         len(mech.memory_names),
     )
@@ -105,7 +105,7 @@ def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Express
     v0 = group_speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * pick(v0, mech.angle_groups)
     mean = v0
-    bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    bristle = mech.deflections(state.bristle)
     extra, v1, load = state.extra, v0, dict[str, Any]()
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
@@ -136,17 +136,18 @@ def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.S
 
 def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, load: dict[str, Any]) -> ca.SX:
     after: list[Any] = []
-    for k, shaft in enumerate(mech.bristles):
+    bristle = mech.deflections(state.bristle)
+    for shaft in mech.bristles:
         omega = mech.shaft_speed(shaft.name, mean)
         transmitted = transmitted_torque(mech, shaft, load)
-        after.append(shaft.friction.advance(h, omega, omega, state.bristle[k], transmitted))
+        after.append(shaft.friction.advance(h, omega, omega, bristle[shaft.name], transmitted))
     return column(after)
 
 
 def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
     at = Motion(q, v, state.extra, state.memory)
-    bristle = {shaft.name: state.bristle[k] for k, shaft in enumerate(mech.bristles)}
+    bristle = mech.deflections(state.bristle)
     instant = INSTANT * h
     done = implicit_kick(mech, Step(instant, v, at, bristle, width))
     value = column([recorded(mech, channel, at, (done.v - v) / instant) for channel in mech.drive.outputs])

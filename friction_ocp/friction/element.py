@@ -14,6 +14,7 @@ import casadi as ca
 
 from friction_ocp.friction.bristle import Dahl, LuGre
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction
+from friction_ocp.friction.maxwell import AbstractMaxwellSlip, Play
 from friction_ocp.friction.smoothing import decay_means, positive_part, smooth_abs, smooth_sign, where
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Directional, Value, inline, quantity
@@ -37,6 +38,10 @@ class LoadDependence:
             return getattr(value, direction) if isinstance(value, Directional) else value
 
         return LoadDependence(pick(self.coulomb), pick(self.stribeck), pick(self.viscous))
+
+
+def _stacked(items: list[Any]) -> ca.SX:
+    return ca.vertcat(*[ca.SX(item) for item in items])
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,9 @@ class FrictionElement:
         return where(sign_of >= 0, getattr(positive, f"sigma{order}"), getattr(negative, f"sigma{order}"))
 
     def bristle_torque(self, omega: Any, deflection: Any, transmitted: Any = 0.0) -> tuple[Any, Any]:
-        """Return the torque of a bristle law and the rate of change of its deflection."""
+        """Return the torque of a bristle law and the rate of change of its deflection, or of its deflections."""
+        if isinstance(self.law, AbstractMaxwellSlip):
+            return self._maxwell_torque(omega, deflection, transmitted)
         rate = omega - self.forgetting_rate(omega, deflection, transmitted) * deflection
         elastic = self._sigma(0, deflection) * deflection + self._sigma(1, deflection) * rate
         return elastic + self._viscous(omega, transmitted) * omega, rate
@@ -109,7 +116,10 @@ class FrictionElement:
         return viscous + transmitted * where(omega >= 0, sides[0], sides[1])
 
     def steady_deflection(self, omega: Any) -> Any:
-        """Return the deflection of a bristle in steady motion, rounded at standstill."""
+        """Return the deflection of a bristle, or those of several, in steady motion, rounded at standstill."""
+        if isinstance(self.law, AbstractMaxwellSlip):
+            reach = [where(omega >= 0, item.forward.reach, item.backward.reach) for item in self._plays(omega, 0.0)]
+            return _stacked([smooth_sign(omega, 0.1 * getattr(self.law, "omega_s", 1.0)) * one for one in reach])
         (_, positive), (_, negative) = self._bristles()
         level = where(omega >= 0, positive.level(smooth_abs(omega)), negative.level(smooth_abs(omega)))
         omega_s = getattr(positive, "omega_s", 1.0)
@@ -119,6 +129,8 @@ class FrictionElement:
         """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""
         if isinstance(self.law, NoFriction):
             return StepResponse(0.0, 0.0, 0.0, 0.0)
+        if isinstance(self.law, AbstractMaxwellSlip):
+            return self._maxwell_response(h, omega, deflection, transmitted)
         if self.law.has_bristle:
             return self._bristle_response(h, omega, deflection, transmitted)
         return self._static_response(omega, transmitted)
@@ -146,7 +158,49 @@ class FrictionElement:
         return StepResponse((sigma0 - sigma1 * rate) * kept * deflection, slope, 0.0, 0.0)
 
     def advance(self, h: Any, omega: Any, mean_omega: Any, deflection: Any, transmitted: Any) -> Any:
-        """Return the deflection after a step at constant speed, exact but for the rate frozen at `omega`."""
+        """Return the deflection after a step at constant speed, exact but for the level frozen at `omega`."""
+        if isinstance(self.law, AbstractMaxwellSlip):
+            plays = self._plays(omega, transmitted)
+            return _stacked([item.after(deflection[k], h * mean_omega) for k, item in enumerate(plays)])
         rate = self.forgetting_rate(omega, deflection, transmitted)
         kept, _ = decay_means(h * rate)
         return deflection + h * kept * (mean_omega - rate * deflection)
+
+    def _plays(self, omega: Any, transmitted: Any) -> list[Play]:
+        """Return the springs of a Maxwell law between the levels of both directions at the speed `omega`."""
+        positive, negative = self.law.along("positive"), self.law.along("negative")
+        assert isinstance(positive, AbstractMaxwellSlip) and isinstance(negative, AbstractMaxwellSlip)
+        speed = smooth_abs(omega)
+        loads = [self._load_level(side, speed, transmitted, with_viscous=False) for side in ("positive", "negative")]
+        springs = (
+            positive.springs(positive.level(speed) + loads[0]),
+            negative.springs(negative.level(speed) + loads[1]),
+        )
+        return [Play(*pair) for pair in zip(*springs, strict=True)]
+
+    def _drag(self, omega: Any, transmitted: Any) -> Any:
+        """Return the signed part of a Maxwell law's torque that depends on the speed alone."""
+        torques: list[Any] = []
+        for side in ("positive", "negative"):
+            law = self.law.along(side)
+            assert isinstance(law, AbstractMaxwellSlip)
+            viscous = 0.0 if self.load is None else transmitted * self.load.along(side).viscous
+            size = smooth_abs(omega)
+            torques.append(law.drag(size) + viscous * size)
+        return where(omega >= 0, torques[0], -torques[1])
+
+    def _maxwell_torque(self, omega: Any, deflection: Any, transmitted: Any) -> tuple[Any, Any]:
+        plays = self._plays(omega, transmitted)
+        both = [item.torque_and_rate(omega, deflection[k]) for k, item in enumerate(plays)]
+        return sum(torque for torque, _ in both) + self._drag(omega, transmitted), ca.vertcat(
+            *[rate for _, rate in both]
+        )
+
+    def _maxwell_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
+        mean = ca.SX.sym("mean")
+        plays = self._plays(omega, transmitted)
+        torque: Any = self._drag(mean, transmitted)
+        for k, item in enumerate(plays):
+            torque = torque + item.mean_torque(deflection[k], h * mean)
+        slope = ca.substitute(ca.jacobian(torque, mean), mean, omega)
+        return StepResponse(ca.substitute(torque, mean, omega) - slope * omega, slope, 0.0, 0.0)

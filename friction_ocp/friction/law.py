@@ -25,12 +25,31 @@ def _toward(value: Any, direction: Direction) -> Any:
     return value
 
 
+def _part_toward(part: Any, direction: Direction) -> Any:
+    """Return a law, or a part of one, without directional values."""
+    changes: dict[str, Any] = {}
+    for item in dataclasses.fields(part):
+        value = getattr(part, item.name)
+        if "kind" in item.metadata:
+            changes[item.name] = _toward(value, direction)
+        elif isinstance(value, tuple):
+            changes[item.name] = tuple(_part_toward(one, direction) for one in value)  # pyright: ignore[reportUnknownVariableType]
+        elif dataclasses.is_dataclass(value):
+            changes[item.name] = _part_toward(value, direction)
+    return dataclasses.replace(part, **changes)
+
+
 @dataclass(frozen=True)
 class AbstractFrictionLaw(ABC):
     """Friction torque of a shaft as a function of its speed (and of a bristle state)."""
 
     name: ClassVar[str]
     has_bristle: ClassVar[bool] = False
+
+    @property
+    def bristle_count(self) -> int:
+        """Number of deflections that are states."""
+        return int(self.has_bristle)
 
     @abstractmethod
     def magnitude(self, speed: Any) -> Any:
@@ -42,9 +61,4 @@ class AbstractFrictionLaw(ABC):
 
     def along(self, direction: Direction) -> Self:
         """Return the law of one direction of motion, without directional values."""
-        changes = {
-            item.name: _toward(getattr(self, item.name), direction)
-            for item in dataclasses.fields(self)
-            if "kind" in item.metadata
-        }
-        return dataclasses.replace(self, **changes)
+        return _part_toward(self, direction)

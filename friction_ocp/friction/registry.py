@@ -5,7 +5,9 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 
 from friction_ocp.friction.bristle import Dahl, LuGre
+from friction_ocp.friction.gms import GeneralizedMaxwellSlip
 from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.polyline_hysteresis import PolylineHysteresis
 from friction_ocp.friction.static import Coulomb, CoulombViscous, NoFriction, Polyline, Quadratic, Stribeck, Viscous
 
 BUILT_IN: tuple[type[AbstractFrictionLaw], ...] = (
@@ -18,6 +20,8 @@ BUILT_IN: tuple[type[AbstractFrictionLaw], ...] = (
     Quadratic,
     Dahl,
     LuGre,
+    GeneralizedMaxwellSlip,
+    PolylineHysteresis,
 )
 
 

@@ -114,13 +114,14 @@ class Polyline(AbstractFrictionLaw):
     name: ClassVar[str] = "polyline"
 
     def magnitude(self, speed: Any) -> Any:
-        torque = self._line(speed)
+        torque = self.line(speed)
         if self.omega_zero is None:
             return torque
-        through_zero = speed * self._line(self.omega_zero) / self.omega_zero
+        through_zero = speed * self.line(self.omega_zero) / self.omega_zero
         return where(speed < self.omega_zero, through_zero, torque)
 
-    def _line(self, speed: Any) -> Any:
+    def line(self, speed: Any) -> Any:
+        """Return the torque of the segments at `speed` >= 0, whatever replaces them near standstill."""
         torque = self.tau_c + self.slopes[0] * speed
         for before, after, knee in zip(self.slopes, self.slopes[1:], self.breaks, strict=False):
             torque = torque + (after - before) * positive_part(speed - knee)

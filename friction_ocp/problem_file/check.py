@@ -7,10 +7,10 @@ from itertools import chain
 
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.problem_file.rules import excitation, recordings, signals, structure, values
+from friction_ocp.problem_file.rules import dissipation, excitation, recordings, signals, structure, values
 from friction_ocp.problem_file.rules.case import Case, Rule
 
-MODEL = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *recordings.NAMES)
+MODEL = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *dissipation.DISSIPATION, *recordings.NAMES)
 """Rules about what stands in the file, whatever else is missing there."""
 WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE)
 """Rules about what has to be there."""

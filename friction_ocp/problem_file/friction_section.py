@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, cast, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, cast, get_args, get_origin, get_type_hints
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
 from friction_ocp.expressions import closest
 from friction_ocp.friction.element import FrictionElement, LoadDependence
@@ -28,6 +28,15 @@ class LoadSection(Section):
         return LoadDependence(**given(self, *type(self).model_fields))
 
 
+class PartSection(Section):
+    """Numbers that belong together within a law, such as one element of many."""
+
+    part: ClassVar[type[Any]]
+
+    def build(self) -> Any:
+        return self.part(**given(self, *type(self).model_fields))
+
+
 class FrictionSection(Section):
     """What every law has beside its own numbers."""
 
@@ -36,7 +45,8 @@ class FrictionSection(Section):
 
     def build(self, law: type[AbstractFrictionLaw]) -> FrictionElement:
         numbers = given(self, *(name for name in type(self).model_fields if name not in ("law", "load")))
-        return FrictionElement(law(**numbers), None if self.load is None else self.load.build())
+        built = {name: _built(value) for name, value in numbers.items()}
+        return FrictionElement(law(**built), None if self.load is None else self.load.build())
 
 
 def read_friction(value: Any) -> FrictionElement:
@@ -56,11 +66,34 @@ def read_friction(value: Any) -> FrictionElement:
 @lru_cache(maxsize=64)
 def _section_of(law: type[AbstractFrictionLaw]) -> type[FrictionSection]:
     """Return the section whose keys are the fields of a law."""
-    hints = get_type_hints(law)
+    return create_model(law.__name__, __base__=FrictionSection, **_keys(law))
+
+
+def _keys(part: type[Any]) -> dict[str, Any]:
+    """Return type and default of every key that stands for a field of a law, or of a part of one."""
+    hints = get_type_hints(part)
     keys: dict[str, Any] = {}
-    for field in dataclasses.fields(law):
+    for field in dataclasses.fields(part):
+        hint = hints[field.name]
+        several = get_origin(hint) is tuple
         if "kind" in field.metadata:
-            several = get_origin(hints[field.name]) is tuple
             default = ... if field.default is dataclasses.MISSING else field.default
             keys[field.name] = (FrictionNumbers if several else FrictionNumber, default)
-    return create_model(law.__name__, __base__=FrictionSection, **keys)
+        else:
+            section = _section_of_part(get_args(hint)[0] if several else hint)
+            keys[field.name] = (Annotated[list[section], Field(min_length=1)] if several else section, ...)
+    return keys
+
+
+@lru_cache(maxsize=64)
+def _section_of_part(part: type[Any]) -> type[PartSection]:
+    section = create_model(part.__name__, __base__=PartSection, **_keys(part))
+    section.part = part
+    return section
+
+
+def _built(value: Any) -> Any:
+    """Return the part of a law that a section stands for; numbers pass."""
+    if isinstance(value, list):
+        return tuple(_built(item) for item in cast("list[Any]", value))
+    return value.build() if isinstance(value, PartSection) else value

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from friction_ocp.drive.parts import Channel, Controller, Drive, Motor, Shaft
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.maxwell import ROUNDING
 from friction_ocp.friction.static import Viscous
 
 WIDTH = 1e-5
@@ -36,6 +39,8 @@ SOLVER = {"reltol": 1e-10, "abstol": 1e-12, "max_num_steps": 100000}
 QUADRATIC = PlantFriction("quadratic", tau_c=(0.1, 0.12), viscous=0.01, quadratic=0.002)
 STRIBECK = PlantFriction("stribeck", 0.1, 0.15, 4.0, viscous=0.01)
 LUGRE = PlantFriction("lugre", 0.1, 0.15, 2.0, viscous=0.01, sigma0=20.0, sigma1=0.05)
+GMS = PlantFriction("gms", 5.0, 6.0, 2.0, viscous=0.01, elements=((6.0, 0.3), (2.0, 0.7)))
+SLIPPING = replace(GMS, tau_c=0.1, tau_s=0.15)
 LOADED = PlantFriction(
     "stribeck", 0.1, 0.15, 4.0, viscous=0.01, load_coulomb=0.2, load_stribeck=0.1, load_viscous=0.005
 )
@@ -55,6 +60,7 @@ MOTIONS: dict[str, tuple[Plant, str, dict[str, float]]] = {
     "two masses": (geared(QUADRATIC, 400.0), "torque", {"motor.omega": 40.0, "load.omega": 8.0}),
     "lugre": (Plant((PlantShaft("motor", 0.01, LUGRE),), (), TORQUE), "torque", {}),
     "two masses, lugre": (geared(LUGRE, 400.0), "torque", {"motor.friction.z": 1e-3}),
+    "springs that do not slip": (Plant((PlantShaft("motor", 0.01, GMS),), (), TORQUE), "torque", {}),
     "loaded rigid joint": (geared(LOADED, np.inf), "torque", {"motor.omega": 8.0}),
     "loaded rigid joint, lugre": (geared(LOADED_LUGRE, np.inf), "torque", {"motor.omega": 3.0}),
     "loaded spring": (geared(LOADED, 400.0), "torque", {"motor.omega": 40.0, "load.omega": 8.0}),
@@ -94,6 +100,16 @@ def test_an_adaptive_solver_agrees_with_the_stepped_drive(name: str) -> None:
     run = Bench(drive).run(DURATION, {f"drive.{signal}": ramp}, initial, STEP, every=0.01)
     for state, values in exact.items():
         assert run[state][1:] == pytest.approx(values, abs=STEP_ERROR * np.max(np.abs(values))), state
+
+
+def test_springs_that_slip_agree_to_their_rounding() -> None:
+    """In continuous time the springs of a Maxwell law let go over a hundredth of their reach."""
+    drive = drive_of(Plant((PlantShaft("motor", 0.01, SLIPPING),), (), TORQUE), {"drive.torque": 0.0})
+    exact = solved(dae(drive, WIDTH), drive, 0.5, 0.9, {})
+    ramp = Trajectory(np.array([0.0, DURATION]), np.array([0.5, 0.9]), "linear")
+    run = Bench(drive).run(DURATION, {"drive.torque": ramp}, {}, STEP, every=0.01)
+    for state, values in exact.items():
+        assert run[state][1:] == pytest.approx(values, abs=ROUNDING * np.max(np.abs(values))), state
 
 
 def test_the_torque_through_a_loaded_rigid_joint_is_algebraic() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,9 @@ from friction_ocp.drive.parts import Channel, Controller, Drive, ExternalTorque,
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.gms import MaxwellElement
 from friction_ocp.friction.registry import friction_laws
+from friction_ocp.friction.static import Polyline
 from friction_ocp.parameters import Directional
 from friction_ocp.simulation.grid import APPLY, COMPUTE, Grid, InputSignal, build_grid
 
@@ -29,6 +32,8 @@ FIELDS = {
     "quadratic": ("tau_c", "viscous", "quadratic"),
     "dahl": ("tau_c", "sigma0", "sigma2"),
     "lugre": ("tau_c", "tau_s", "omega_s", "sigma0", "sigma1", "sigma2", "delta"),
+    "gms": ("tau_c", "tau_s", "omega_s", "viscous", "delta"),
+    "polyline_hysteresis": ("tau_c", "slopes", "breaks"),
 }
 
 
@@ -47,6 +52,10 @@ def friction_of(friction: PlantFriction) -> FrictionElement:
             numbers[name] = 1.0
         else:
             numbers[name] = _by_direction(friction.tau_c if value is None else value)
+    if friction.law == "gms":
+        numbers["elements"] = tuple(MaxwellElement(*element) for element in friction.elements)
+    if friction.law == "polyline_hysteresis":
+        numbers = {"polyline": Polyline(**numbers), "width": _by_direction(friction.width)}
     shares = (friction.load_coulomb, friction.load_stribeck, friction.load_viscous)
     load = LoadDependence(*(_by_direction(share) for share in shares)) if any(shares) else None
     return FrictionElement(friction_laws()[friction.law](**numbers), load)
@@ -221,7 +230,7 @@ class Twin:
         return truth, self.bench.run(duration, {**self.inputs, "supply": supply}, self._states(initial or {}), step)
 
     def _states(self, initial: Mapping[str, float]) -> dict[str, float]:
-        return {name.replace(".z", ".friction.z"): value for name, value in initial.items()}
+        return {re.sub(r"\.z(\d*)$", r".friction.z\1", name): value for name, value in initial.items()}
 
 
 def worst(truth: Run, ours: Run, *names: str) -> float:

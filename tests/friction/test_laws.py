@@ -12,7 +12,9 @@ import pytest
 
 from friction_ocp.friction.bristle import Dahl, LuGre
 from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.gms import GeneralizedMaxwellSlip, MaxwellElement
 from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.polyline_hysteresis import PolylineHysteresis
 from friction_ocp.friction.registry import BUILT_IN, friction_laws
 from friction_ocp.friction.static import Coulomb, CoulombViscous, NoFriction, Polyline, Quadratic, Stribeck, Viscous
 from friction_ocp.parameters import Directional, leaves
@@ -47,6 +49,11 @@ LAWS: dict[str, tuple[AbstractFrictionLaw, Callable[[float], float]]] = {
     "quadratic": (Quadratic(0.2, 0.01, 0.002), lambda w: 0.2 + 0.01 * w + 0.002 * w**2),
     "dahl": (Dahl(0.2, 500.0, 0.01), lambda w: 0.2 + 0.01 * w),
     "lugre": (LuGre(0.2, 0.3, 4.0, 500.0, 0.5, 0.01), lambda w: stribeck(w, 2.0)),
+    "gms": (
+        GeneralizedMaxwellSlip((MaxwellElement(500.0, 0.3), MaxwellElement(100.0, 0.7)), 0.2, 0.3, 4.0, 0.01),
+        lambda w: stribeck(w, 2.0),
+    ),
+    "polyline_hysteresis": (PolylineHysteresis(Polyline(0.2, (0.02, 0.004, 0.01), (5.0, 15.0)), 1e-3), polyline),
 }
 SPEEDS = np.array([0.0, 0.01, 0.3, 0.5, 4.0, 5.0, 12.0, 15.0, 200.0])
 LOAD = LoadDependence(coulomb=0.1, stribeck=0.05, viscous=0.002)
@@ -60,7 +67,9 @@ def by_direction(law: AbstractFrictionLaw, factor: float) -> AbstractFrictionLaw
     changes: dict[str, object] = {}
     for item in dataclasses.fields(law):
         value = getattr(law, item.name)
-        if item.name == "slopes":
+        if item.name == "polyline":
+            changes[item.name] = by_direction(value, factor)
+        elif item.name == "slopes":
             changes[item.name] = tuple(Directional(entry, factor * entry) for entry in value)
         elif item.name in scaled:
             changes[item.name] = Directional(value, factor * value)

@@ -17,6 +17,7 @@ from .layout import (
     LOAD_C,
     LOAD_S,
     LOAD_V,
+    LOOP,
     OMEGA_S,
     PIECES,
     QUADRATIC,
@@ -43,6 +44,7 @@ USES = {
     "dahl": ("tau_c", "sigma0", "viscous"),
     "lugre": ("tau_c", "tau_s", "omega_s", "delta", "viscous", "sigma0", "sigma1"),
     "gms": ("tau_c", "tau_s", "omega_s", "delta", "viscous", "elements"),
+    "polyline_hysteresis": ("tau_c", "slopes", "breaks", "width"),
 }
 LOADS = ("load_coulomb", "load_stribeck", "load_viscous")
 SCALARS = {
@@ -66,7 +68,7 @@ def _toward(value: Directional, direction: int) -> float:
 
 
 def _law_code(friction: PlantFriction) -> int:
-    return {"dahl": BRISTLE, "lugre": BRISTLE, "gms": GMS}.get(friction.law, STATIC)
+    return {"dahl": BRISTLE, "lugre": BRISTLE, "gms": GMS, "polyline_hysteresis": LOOP}.get(friction.law, STATIC)
 
 
 def _friction_columns(where: str, friction: PlantFriction) -> np.ndarray:
@@ -84,6 +86,8 @@ def _friction_columns(where: str, friction: PlantFriction) -> np.ndarray:
         for column, name in SCALARS.items():
             value = getattr(friction, name)
             row[column] = _toward(friction.tau_c if value is None else value, direction)
+        if friction.law == "polyline_hysteresis":
+            row[SIGMA0] = 2.0 * row[TAU_C] / _toward(friction.width, direction)
         row[PIECES] = len(slopes)
         row[SLOPES : SLOPES + len(slopes)] = [_toward(value, direction) for value in slopes]
         row[BREAKS : BREAKS + len(slopes)] = [_toward(value, direction) for value in breaks[: len(slopes)]]
@@ -94,7 +98,7 @@ def _friction_columns(where: str, friction: PlantFriction) -> np.ndarray:
 def _check_friction(where: str, friction: PlantFriction, columns: np.ndarray) -> None:
     if np.any(columns[:, PIECES] > BREAKS - SLOPES):
         raise ValueError(f"{where}: more than {BREAKS - SLOPES} slopes or elements")
-    if friction.law in ("dahl", "lugre", "gms") and np.any(columns[:, TAU_C] <= 0):
+    if friction.law in ("dahl", "lugre", "gms", "polyline_hysteresis") and np.any(columns[:, TAU_C] <= 0):
         raise ValueError(f"{where}: law '{friction.law}' needs tau_c > 0")
     weakens = friction.tau_s is not None or friction.load_stribeck != 0.0
     if weakens and np.any(columns[:, OMEGA_S] <= 0):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-STATIC, BRISTLE, GMS = 0, 1, 2
+STATIC, BRISTLE, GMS, LOOP = 0, 1, 2, 3
 TAU_C, TAU_S, OMEGA_S, DELTA, VISCOUS, QUADRATIC, SIGMA0, SIGMA1, LOAD_C, LOAD_S, LOAD_V, PIECES = range(12)
 SLOPES, BREAKS, COLUMNS = 12, 20, 28
 CURRENT, TORQUE, VOLTAGE = 0, 1, 2
@@ -88,7 +88,8 @@ STATE = np.dtype(
         ("omega", FLOAT, (SHAFTS, 3)),  # per group: now, at the start of the step, predicted mid step
         ("alpha", FLOAT, (SHAFTS, 3)),  # per group: this step, the step before, noise torque / inertia
         ("bristle", FLOAT, (SHAFTS, 8)),
-        ("memory", FLOAT, (SHAFTS,)),  # bristle rate or GMS level of the step
+        ("memory", FLOAT, (SHAFTS,)),  # bristle rate of the step, or level of springs that slip, positive direction
+        ("opposite", FLOAT, (SHAFTS,)),  # the same level, negative direction
         ("force", FLOAT, (SHAFTS, 7)),  # applied, its slope, passed on, friction A, B, torque T, work space
         ("joint_torque", FLOAT, (JOINTS,)),
         # current, torque, voltage at start and end, mean voltage, inductive current, command at start and end, kt

@@ -14,6 +14,7 @@ from .layout import (
     LOAD_C,
     LOAD_S,
     LOAD_V,
+    LOOP,
     OMEGA_S,
     PIECES,
     QUADRATIC,
@@ -56,6 +57,34 @@ def bristle_line(m, st, i, omega, d, top, slope, h):
 
 
 @njit
+def polyline(q, speed):
+    """Return the torque of the segments at `speed` >= 0 and their slope there."""
+    value, start = 0.0, 0.0
+    for j in range(int(q[PIECES])):
+        end = q[BREAKS + j]
+        value += q[SLOPES + j] * (min(speed, end) - start)
+        if speed < end:
+            return value, q[SLOPES + j]
+        start = end
+    return value, 0.0
+
+
+@njit
+def loop_line(m, st, i, omega, top, slope, h):
+    """Return A, B of a spring that slips at `top`, beside the segments of a polyline."""
+    q = m.friction[i, 0 if omega >= 0.0 else 1]
+    value, piece = polyline(q, abs(omega))
+    value *= st.factor[i, 1]
+    piece *= st.factor[i, 1]
+    z = st.bristle[i, 0]
+    stiffness = m.friction[i, 0 if z > 0.0 or (z == 0.0 and omega >= 0.0) else 1, SIGMA0]
+    a = (value if omega >= 0.0 else -value) - piece * omega
+    if abs(z + 0.5 * h * omega) * q[SIGMA0] < top or z * omega < 0.0:
+        return a + stiffness * z, slope + piece + 0.5 * h * stiffness
+    return a + (top if omega >= 0.0 else -top), slope + piece
+
+
+@njit
 def friction_line(m, st, i, omega, d, load, h):
     """Return A, B of the mean friction torque A + B omega_mid of a step; d is the direction at standstill."""
     q = m.friction[i, 0 if (omega > 0.0 or (omega == 0.0 and d > 0.0)) else 1]
@@ -65,13 +94,17 @@ def friction_line(m, st, i, omega, d, load, h):
     top = dry * level(q, speed, load) + st.factor[i, 2]
     if m.law[i] == BRISTLE:
         return bristle_line(m, st, i, omega, d, top, slope, h)
+    if m.law[i] == LOOP or m.law[i] == GMS:
+        st.memory[i] = dry * level(m.friction[i, 0], speed, load) + st.factor[i, 2]
+        st.opposite[i] = dry * level(m.friction[i, 1], speed, load) + st.factor[i, 2]
+    if m.law[i] == LOOP:
+        return loop_line(m, st, i, omega, top, slope, h)
     if m.law[i] == GMS:
         a = 0.0
-        st.memory[i] = top
         for j in range(int(q[PIECES])):
             force = st.bristle[i, j] + 0.5 * h * q[SLOPES + j] * omega
             limit = q[BREAKS + j] * top
-            if abs(force) < limit:
+            if abs(force) < limit or force * omega < 0.0:
                 a += st.bristle[i, j]
                 slope += 0.5 * h * q[SLOPES + j]
             else:
@@ -79,14 +112,9 @@ def friction_line(m, st, i, omega, d, load, h):
         return a, slope
     value = top + slope * speed + wet * q[QUADRATIC] * speed * speed
     slope += 2.0 * wet * q[QUADRATIC] * speed
-    start = 0.0
-    for j in range(int(q[PIECES])):
-        end = q[BREAKS + j]
-        value += wet * q[SLOPES + j] * (min(speed, end) - start)
-        if speed < end:
-            slope += wet * q[SLOPES + j]
-            break
-        start = end
+    pieces, piece = polyline(q, speed)
+    value += wet * pieces
+    slope += wet * piece
     return d * value - slope * omega, slope
 
 

@@ -22,7 +22,17 @@ Directional = float | tuple[float, float]
 """One value, or (positive, negative) by the direction of motion."""
 
 Law = Literal[
-    "none", "coulomb", "viscous", "coulomb_viscous", "stribeck", "polyline", "quadratic", "dahl", "lugre", "gms"
+    "none",
+    "coulomb",
+    "viscous",
+    "coulomb_viscous",
+    "stribeck",
+    "polyline",
+    "quadratic",
+    "dahl",
+    "lugre",
+    "gms",
+    "polyline_hysteresis",
 ]
 
 
@@ -32,7 +42,9 @@ class PlantFriction:
 
     The torque opposes omega. Levels grow with the torque T that the shaft passes on towards the load:
     Coulomb part + load_coulomb |T|, Stribeck part + load_stribeck |T|, viscous part + load_viscous |T|.
-    sigma0 and sigma1 follow the sign of the deflection, everything else the sign of the speed.
+    sigma0 and sigma1 follow the sign of the deflection, everything else the sign of the speed. The dry part of
+    polyline_hysteresis is a spring that slips at tau_c and turns from one direction to the other over the travel
+    `width`; gms is several springs (stiffness, share of the level at which it slips).
     """
 
     law: Law = "none"
@@ -47,6 +59,7 @@ class PlantFriction:
     sigma0: Directional = 0.0
     sigma1: Directional = 0.0
     elements: tuple[tuple[float, float], ...] = ()
+    width: Directional = 0.0
     load_coulomb: Directional = 0.0
     load_stribeck: Directional = 0.0
     load_viscous: Directional = 0.0

@@ -26,7 +26,7 @@ from .flaw_kernels import (
     settle_loops,
     spring_torque,
 )
-from .layout import BREAKS, BRISTLE, CURRENT, GMS, PIECES, SLOPES, VOLTAGE
+from .layout import BREAKS, BRISTLE, CURRENT, GMS, LOOP, PIECES, SIGMA0, SLOPES, VOLTAGE
 from .mechanics import contact, demand, move
 from .signals import control, read_signals, sense
 
@@ -166,11 +166,17 @@ def advance(m, st):
                 x = st.memory[i] * h
                 phi = 1.0 - 0.5 * x if x < 1e-4 else -math.expm1(-x) / x
                 st.bristle[i, 0] += (mean - st.memory[i] * st.bristle[i, 0]) * h * phi
+            elif m.law[i] == LOOP:
+                forward = st.memory[i] / m.friction[i, 0, SIGMA0]
+                backward = st.opposite[i] / m.friction[i, 1, SIGMA0]
+                st.bristle[i, 0] = min(max(st.bristle[i, 0] + mean * h, -backward), forward)
             elif m.law[i] == GMS:
-                q = m.friction[i, 0 if mean >= 0.0 else 1]
+                q, other = m.friction[i, 0], m.friction[i, 1]
                 for j in range(int(q[PIECES])):
-                    limit = q[BREAKS + j] * st.memory[i]
-                    st.bristle[i, j] = min(max(st.bristle[i, j] + q[SLOPES + j] * mean * h, -limit), limit)
+                    force = st.bristle[i, j] + (q if mean >= 0.0 else other)[SLOPES + j] * mean * h
+                    st.bristle[i, j] = min(
+                        max(force, -other[BREAKS + j] * st.opposite[i]), q[BREAKS + j] * st.memory[i]
+                    )
 
 
 @njit

@@ -79,8 +79,19 @@ def test_every_fitted_number_is_found(workshop: Workshop) -> None:
                     },
                 },
                 {"name": "arm", "inertia": one, "gravity": {"torque": one}},
+                {
+                    "name": "table",
+                    "inertia": one,
+                    "friction": {
+                        "law": "gms",
+                        "elements": [{"stiffness": one, "share": {"positive": one, "negative": one}}],
+                        "tau_c": one,
+                        "tau_s": 9.0,
+                        "omega_s": 1.0,
+                    },
+                },
             ],
-            "transmissions": [{"stiffness": one, "damping": one}],
+            "transmissions": [{"stiffness": one, "damping": one}, {"stiffness": "rigid"}],
         }
         content["channels"]["position"] |= {"gain": one, "offset": one, "delay": one}
 
@@ -88,7 +99,7 @@ def test_every_fitted_number_is_found(workshop: Workshop) -> None:
     free = [path for path, value in values_of(load_problem(source)).items() if isinstance(value, Free)]
     fitted = {path: 1.0 + 0.01 * k for k, path in enumerate(free)}
     after = values_of(reread(source, fitted, workshop.folder))
-    assert len(free) == 16
+    assert len(free) == 21
     assert {path: after[path].guess for path in free} == fitted
 
 

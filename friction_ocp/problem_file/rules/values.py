@@ -12,7 +12,7 @@ from friction_ocp.friction.law import AbstractFrictionLaw, Direction
 from friction_ocp.parameters import Free, Tie
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 
-_POSITIVE = {"resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"}
+_POSITIVE = {"resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero", "width"}
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash"}
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _SOLVER_TOLERANCE = 1e-6
@@ -82,14 +82,16 @@ def _same_direction(case: Case, stem: str, direction: str) -> list[str]:
 def polylines_have_their_breaks(case: Case) -> Iterator[Finding]:
     """k slopes meet at k - 1 break speeds, which rise."""
     for k, law in enumerate(shaft.friction.law for shaft in case.bound.shafts):
-        if not hasattr(law, "slopes") or not hasattr(law, "breaks"):
+        inner = getattr(law, "polyline", None)
+        line = law if inner is None else inner
+        if not hasattr(line, "slopes") or not hasattr(line, "breaks"):
             continue
-        where = case.at(f"drive.shafts[{k}].friction.breaks")
-        slopes, breaks = len(getattr(law, "slopes")), len(getattr(law, "breaks"))  # noqa: B009
+        where = case.at(f"drive.shafts[{k}].friction.{'' if inner is None else 'polyline.'}breaks")
+        slopes, breaks = len(getattr(line, "slopes")), len(getattr(line, "breaks"))  # noqa: B009
         if breaks != slopes - 1:
             what = f"there are {breaks} breaks for {slopes} slopes"
             yield Finding(where, what, f"{max(slopes - 1, 0)} breaks: one fewer than slopes")
-        speeds = {tuple(_breaks(law, direction)) for direction in _DIRECTIONS}
+        speeds = {tuple(_breaks(line, direction)) for direction in _DIRECTIONS}
         for several in speeds:
             if any(not after > before for before, after in zip((0.0, *several), several, strict=False)):
                 shown = ", ".join(f"{speed:g}" for speed in several)
@@ -119,21 +121,6 @@ def load_stribeck_has_a_speed(case: Case) -> Iterator[Finding]:
             yield Finding(
                 case.at(f"drive.shafts[{k}].friction.load.stribeck"), what, "laws with omega_s: stribeck, lugre"
             )
-
-
-def bristles_are_passive(case: Case) -> Iterator[Finding]:
-    """A LuGre model that can give energy back is doubtful. Source: Barahanov & Ortega 2000."""
-    for k, shaft in enumerate(case.bound.shafts):
-        for law in {shaft.friction.law.along(direction) for direction in _DIRECTIONS}:
-            if not all(hasattr(law, key) for key in ("sigma1", "sigma2", "tau_s", "tau_c")):
-                continue
-            tau_c, tau_s, sigma1, sigma2 = (getattr(law, key) for key in ("tau_c", "tau_s", "sigma1", "sigma2"))
-            limit = sigma1 * (tau_s - tau_c) / tau_c if tau_c > 0 else 0.0
-            if sigma1 > 0 and sigma2 <= limit and tau_s > tau_c:
-                what = f"sigma2 = {sigma2:g} is not above sigma1 (tau_s - tau_c)/tau_c = {limit:g}"
-                allowed = "a passive LuGre model has sigma2 > sigma1 (tau_s - tau_c)/tau_c"
-                where = case.at(f"drive.shafts[{k}].friction")
-                yield Finding(where, what, allowed, "lower sigma1", severity="warning")
 
 
 def ties_can_be_computed(case: Case) -> Iterator[Finding]:
@@ -196,7 +183,6 @@ VALUES: tuple[Rule, ...] = (
     breakaway_is_above_coulomb,
     polylines_have_their_breaks,
     load_stribeck_has_a_speed,
-    bristles_are_passive,
 )
 WHOLE: tuple[Rule, ...] = (
     load_dependence_has_a_load,
