@@ -191,10 +191,12 @@ class FrictionElement:
 
     def _maxwell_torque(self, omega: Any, deflection: Any, transmitted: Any) -> tuple[Any, Any]:
         plays = self._plays(omega, transmitted)
-        both = [item.torque_and_rate(omega, deflection[k]) for k, item in enumerate(plays)]
-        return sum(torque for torque, _ in both) + self._drag(omega, transmitted), ca.vertcat(
-            *[rate for _, rate in both]
-        )
+        torque, rates = self._drag(omega, transmitted), list[Any]()
+        for k, item in enumerate(plays):
+            elastic, rate = item.torque_and_rate(omega, deflection[k])
+            torque = torque + elastic
+            rates.append(rate)
+        return torque, _stacked(rates)
 
     def _maxwell_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
         mean = ca.SX.sym("mean")
