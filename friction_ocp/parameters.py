@@ -51,6 +51,11 @@ Value = Any
 """float, Free, Tie or Directional in a drive as read; float or SX in a drive whose values are bound."""
 
 
+def is_off(value: Value) -> bool:
+    """Whether a number is plainly zero or absent: known, and neither fitted nor tied."""
+    return value is None or (isinstance(value, (int, float)) and value == 0)
+
+
 def quantity(kind: str, meaning: str, default: Any = dataclasses.MISSING, nested: str | float | None = None) -> Any:
     """Declare a numeric field of a part: `kind` names its unit, `meaning` is its sentence for the reader.
 

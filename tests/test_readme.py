@@ -6,15 +6,16 @@ import argparse
 import dataclasses
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from servo_problem import REPOSITORY, servo_document, write_problem
 
 from friction_ocp.cli import _parser
-from friction_ocp.drive.parts import Controller, ControllerType, Gravity, Motor, Transmission
+from friction_ocp.drive.parts import Channel, Controller, ControllerType, Gravity, Motor, Shaft, Transmission
 from friction_ocp.estimation.estimate import simulate
 from friction_ocp.friction import registry
+from friction_ocp.friction.element import FrictionElement
 from friction_ocp.problem_file.check import check
 from friction_ocp.problem_file.load import load_problem
 
@@ -109,6 +110,20 @@ def test_the_part_table_names_existing_numbers() -> None:
         assert set(listed) == {item.name for item in dataclasses.fields(part) if "kind" in item.metadata}
     assert set(re.findall(r"`(\w+)", rows["controller"][0])) | {"duty"} == set(ControllerType.__args__)
     assert {item.name for item in dataclasses.fields(Gravity)} == {"torque", "phase"}
+
+
+def test_the_term_table_names_all_terms_and_their_numbers() -> None:
+    """Every optional term of a part is listed once, with the numbers that it has."""
+    owners = {"shaft": Shaft, "shaft.friction": FrictionElement, "transmission": Transmission, "motor": Motor}
+    terms = {
+        f"{place}.{name}": [item.name for item in dataclasses.fields(part)]
+        for place, owner in (owners | {"channel": Channel}).items()
+        for name, hint in get_type_hints(owner).items()
+        for part in get_args(hint)
+        if dataclasses.is_dataclass(part) and name not in ("load", "gravity", "external_torque")
+    }
+    listed = {name: list(quoted(numbers.split("|")[0])) for name, numbers in table("optional term").items()}
+    assert listed == terms
 
 
 def test_the_map_names_every_folder() -> None:

@@ -14,9 +14,11 @@ import casadi as ca
 from friction_ocp.dae import Dae, Variable
 from friction_ocp.drive.coordinates import group_angles, group_speeds
 from friction_ocp.drive.kick import through_joint, transmitted_torque
-from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.motors import extra_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
+from friction_ocp.drive.torques import applied_torques, elastic_torque
 from friction_ocp.drive.units import command_unit, signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -57,7 +59,7 @@ def dae(drive: Drive, width: float) -> Dae:
     mech = mechanism(drive)
     symbols = _symbols(mech)
     at = Motion(group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds), symbols.extra, symbols.memory)
-    torques = mech.applied_torques(at, width)
+    torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
     acceleration = column([_acceleration(mech, g, torques, friction) for g in range(len(mech.topology.roots))])
@@ -74,7 +76,7 @@ def dae(drive: Drive, width: float) -> Dae:
             Variable(channel.name, signal_unit(drive, channel.measures), ca.SX(value))
             for channel, value in zip(mech.drive.outputs, outputs, strict=True)
         ),
-        ode=ca.vertcat(column([*turning, *speeding, *rates]), mech.extra_rates(at)),
+        ode=ca.vertcat(column([*turning, *speeding, *rates]), extra_rates(mech, at)),
         alg=symbols.torques - found,
     )
 
@@ -89,7 +91,7 @@ def _symbols(mech: Mechanism) -> _Symbols:
 
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
-    elastic = {item.name: mech.elastic_torque(item, at, width) for item in mech.topology.elastic}
+    elastic = {item.name: elastic_torque(mech, item, at, width) for item in mech.topology.elastic}
     return elastic | {joint.name: symbols.torques[k] for k, joint in enumerate(mech.loaded_joints())}
 
 
@@ -102,11 +104,12 @@ def _friction(
     deflection = mech.deflections(symbols.bristle)
     for shaft in mech.drive.shafts:
         omega, transmitted = mech.shaft_speed(shaft.name, at.v), transmitted_torque(mech, shaft, load)
+        element = shaft.friction.under(mech.surroundings(shaft, at))
         if shaft.name in deflection:
-            torque, rate = shaft.friction.bristle_torque(omega, deflection[shaft.name], transmitted)
+            torque, rate = element.bristle_torque(omega, deflection[shaft.name], transmitted)
             rates.append(rate)
         else:
-            torque = shaft.friction.torque(omega, transmitted, width)
+            torque = element.torque(omega, transmitted, width)
         friction[shaft.name] = torque
     return friction, rates
 
@@ -138,15 +141,16 @@ def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
 
 
 def _inputs(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
-    measures = {channel.name: channel.measures for channel in mech.drive.inputs}
-    given = [
-        Variable(
-            name, signal_unit(mech.drive, measures[name.removesuffix("'")]) + ("/s" if name.endswith("'") else ""), item
-        )
-        for name, item in mech.inputs.items()
-    ]
+    given = [Variable(name, _input_unit(mech.drive, name), item) for name, item in mech.inputs.items()]
     held = [item for item in ca.vertsplit(symbols.memory) if item.is_symbolic()]
     return (*given, *(Variable(HELD, _state_unit(mech.drive, HELD), item) for item in held))
+
+
+def _input_unit(drive: Drive, name: str) -> str:
+    if name == TIME:
+        return si_unit("time")
+    measures = next(channel.measures for channel in drive.inputs if channel.name == name.removesuffix("'"))
+    return signal_unit(drive, measures) + ("/s" if name.endswith("'") else "")
 
 
 def _parameters(drive: Drive, mech: Mechanism) -> tuple[Variable, ...]:

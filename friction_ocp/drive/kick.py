@@ -9,13 +9,14 @@ starts anew, so that the order 2 holds across events too. Related: Moreau 1988 (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
 from friction_ocp.drive.parts import Shaft, Transmission
+from friction_ocp.drive.torques import applied_torques, elastic_torque
 from friction_ocp.friction.element import FrictionElement, StepResponse
 from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, where
 
@@ -76,7 +77,7 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     symbols = ca.SX.sym("transmitted", len(joints))
     torques, stiffening = _applied(mech, step)
     corner = step.width[len(mech.topology.roots)]
-    load = {item.name: mech.elastic_torque(item, step.at, corner) for item in mech.topology.elastic}
+    load = {item.name: elastic_torque(mech, item, step.at, corner) for item in mech.topology.elastic}
     load |= {joint.name: symbols[k] for k, joint in enumerate(joints)}
     v, mean, friction = _solve(mech, step, torques, stiffening, load)
     if not joints:
@@ -90,8 +91,7 @@ def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
     """Return the torque on each shaft and, by group, the derivative of its torque by its own speed."""
     groups = len(mech.topology.roots)
     speed = ca.SX.sym("speed", groups)
-    at = Motion(step.at.q, speed, step.at.extra, step.at.memory)
-    symbolic = mech.applied_torques(at, step.width[groups])
+    symbolic = applied_torques(mech, replace(step.at, v=speed), step.width[groups])
     total = [_group_sum(mech, g, symbolic) for g in range(groups)]
     own = [ca.substitute(ca.jacobian(ca.SX(total[g]), speed[g]), speed, step.at.v) for g in range(groups)]
     torques = {name: ca.substitute(ca.SX(torque), speed, step.at.v) for name, torque in symbolic.items()}
@@ -162,7 +162,7 @@ def _response(
 ) -> StepResponse:
     """Return the response of a shaft's friction about the step's own speed, or about the group speed given."""
     omega = symbol("omega")
-    element: FrictionElement = shaft.friction
+    element: FrictionElement = shaft.friction.under(mech.surroundings(shaft, step.at))
     transmitted = transmitted_torque(mech, shaft, load)
     response = element.step_response(step.h, omega, step.bristle.get(shaft.name, 0.0), transmitted)
     now = mech.shaft_speed(shaft.name, step.at.v) if speed is None else ca.SX(speed)

@@ -6,17 +6,24 @@ time-stepping form with exact sticking are both made from the same expressions.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, memory_names, saturate
+from friction_ocp.drive.control import has_integral, memory_names
+from friction_ocp.drive.live_terms import live_terms
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.friction.smoothing import soft_threshold, where
+from friction_ocp.friction.modifiers import Surroundings
+from friction_ocp.parameters import is_off
+
+TIME = "/time"
+"""The input that holds the time since the start of the recording, s, in drives that depend on it: the name of the
+time axis in the file, which no channel can have."""
 
 
 def symbol(name: str) -> ca.SX:
@@ -47,6 +54,10 @@ class Motion:
     """Continuous states: winding currents and controller integrals."""
     memory: ca.SX
     """What a sampled controller holds between ticks."""
+    h: Any = None
+    """Length of the step over which torques are averaged, s; None at an instant."""
+    steady: ca.SX | None = None
+    """(groups,) mean speeds over that step, by which nothing is linearised."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +102,7 @@ class Mechanism:
     @property
     def extra_names(self) -> tuple[str, ...]:
         """Names of the continuous states beside motion and bristles."""
-        names = [f"{motor.name}.current" for motor in self.drive.motors if self._has_winding_state(motor)]
+        names = [f"{motor.name}.current" for motor in self.drive.motors if self.has_winding_state(motor)]
         controller = self.drive.controller
         if controller is not None and controller.sample_time is None and has_integral(controller):
             names.append("controller.integral")
@@ -137,6 +148,16 @@ class Mechanism:
         """Return the speed of a shaft for group speeds `v`."""
         return v[self.topology.group_of[name]] * self.topology.speed_ratio[name]
 
+    def angle_passed(self, name: str, motion: Motion) -> tuple[Any, Any]:
+        """Return the angle of a shaft and what it passes in the step over which torques are averaged."""
+        passed = None if motion.steady is None else motion.h * self.shaft_speed(name, motion.steady)
+        return self.shaft_angle(name, motion), passed
+
+    def surroundings(self, shaft: Shaft, motion: Motion) -> Surroundings:
+        """Return what the friction of a shaft depends on beside speed and load."""
+        theta, passed = self.angle_passed(shaft.name, motion)
+        return Surroundings(theta, passed, self.inputs.get(TIME, 0.0), self.true_input("temperature"))
+
     def inertia(self, group: int) -> Any:
         """Return the inertia of a group, referred to its first shaft."""
         return sum(
@@ -151,165 +172,65 @@ class Mechanism:
                 return (self.inputs[channel.name] - channel.offset) / channel.gain
         return None
 
-    def elastic_torque(self, item: Transmission, motion: Motion, corner: Any) -> Any:
-        """Return the torque that an elastic transmission exerts on its output shaft.
-
-        Backlash is a dead zone of the twist whose corners are rounded by `corner` times the free play; the
-        damper acts while the flanks touch.
-        """
-        twist = self.shaft_angle(item.from_shaft, motion) / item.ratio - self.shaft_angle(item.to_shaft, motion)
-        rate = self.shaft_speed(item.from_shaft, motion.v) / item.ratio - self.shaft_speed(item.to_shaft, motion.v)
-        if not isinstance(item.backlash, ca.SX) and item.backlash == 0.0:
-            return item.stiffness * twist + item.damping * rate
-        half = 0.5 * item.backlash
-        inside = symbol("twist")
-        wound = soft_threshold(inside, half, half, corner * half)
-        contact = ca.substitute(ca.jacobian(wound, inside), inside, twist)
-        wound = ca.substitute(wound, inside, twist)
-        torque = item.stiffness * wound + item.damping * rate * contact
-        return where(wound >= 0, ca.fmax(torque, 0.0), ca.fmin(torque, 0.0))
-
-    def applied_torques(self, motion: Motion, corner: Any) -> dict[str, Any]:
-        """Return the torque on every shaft other than friction and torque through rigid joints."""
-        torques: dict[str, Any] = {}
-        for shaft in self.drive.shafts:
-            torque: Any = ca.SX(0.0)
-            if shaft.gravity is not None:
-                angle = self.shaft_angle(shaft.name, motion) + shaft.gravity.phase
-                torque = torque - shaft.gravity.torque * ca.sin(ca.SX(angle))
-            if shaft.external_torque is not None:
-                torque = torque + shaft.external_torque.constant
-            torques[shaft.name] = torque
-        for item in self.topology.elastic:
-            exerted = self.elastic_torque(item, motion, corner)
-            torques[item.to_shaft] = torques[item.to_shaft] + exerted
-            torques[item.from_shaft] = torques[item.from_shaft] - exerted / item.ratio
-        for motor in self.drive.motors:
-            torques[motor.shaft] = torques[motor.shaft] + self.motor_torque(motor, motion)
-        return torques
-
-    def motor_torque(self, motor: Motor, motion: Motion) -> Any:
-        """Return the torque of a motor on its shaft, 0 while it is not enabled."""
-        torque = self.true_input(f"{motor.name}.torque")
-        torque = self._commanded(motor, "torque", motion) if torque is None else motor.share * torque
-        if torque is not None:
-            return self._enabled(motor, torque)
-        current = self.motor_current(motor, motion)
-        return 0.0 if current is None else motor.torque_constant * current
-
-    def _enabled(self, motor: Motor, value: Any) -> Any:
-        enable = self.true_input(f"{motor.name}.enable")
-        return value if enable is None else where(enable > 0.5, value, 0.0)
-
-    def motor_current(self, motor: Motor, motion: Motion) -> Any | None:
-        """Return the winding current, 0 while the motor is not enabled; None for a motor driven by torque."""
-        current = self._current(motor, motion)
-        return None if current is None else self._enabled(motor, current)
-
-    def _current(self, motor: Motor, motion: Motion) -> Any | None:
-        if self._has_winding_state(motor):
-            return motion.extra[self.extra_names.index(f"{motor.name}.current")]
-        for signal in ("current", "current_command"):
-            current = self.true_input(f"{motor.name}.{signal}")
-            if current is not None:
-                return motor.share * current
-        commanded = self._commanded(motor, "current", motion)
-        if commanded is not None:
-            return commanded
-        voltage = self.motor_voltage(motor, motion)
-        if voltage is None:
-            return None
-        return (voltage - motor.torque_constant * self.shaft_speed(motor.shaft, motion.v)) / motor.resistance
-
-    def motor_voltage(self, motor: Motor, motion: Motion) -> Any | None:
-        """Return the terminal voltage; a duty controller scales the supply voltage."""
-        voltage = self.true_input(f"{motor.name}.voltage")
-        if voltage is not None:
-            return motor.share * voltage
-        commanded = self._commanded(motor, "voltage", motion)
-        controller = self.drive.controller
-        if commanded is None or controller is None or controller.type != "duty":
-            return commanded
-        supply = self.true_input(f"{motor.name}.supply_voltage")
-        return commanded if supply is None else commanded * supply
-
-    def _has_winding_state(self, motor: Motor) -> bool:
+    def has_winding_state(self, motor: Motor) -> bool:
+        """Whether the current of a motor is a state: driven by voltage through an inductance."""
         if motor.inductance is None:
             return False
         controller = self.drive.controller
         by_input = any(channel.measures == f"{motor.name}.voltage" for channel in self.drive.inputs)
         return by_input or (controller is not None and controller.output == "voltage")
 
-    def _commanded(self, motor: Motor, output: str, motion: Motion) -> Any | None:
-        controller = self.drive.controller
-        if controller is None or controller.output != output:
-            return None
-        if controller.sample_time is not None:
-            return motor.share * motion.memory[self.memory_names.index("controller.held")]
-        integral = motion.extra[self.extra_names.index("controller.integral")] if has_integral(controller) else 0.0
-        return motor.share * saturate(controller, command(controller, self.seen(motion), integral))
-
-    def seen(self, motion: Motion) -> ControlSignals:
-        """Return what the controller sees through its feedback channel."""
-        controller = self.drive.controller
-        assert controller is not None
-        channel = next(item for item in self.drive.channels if item.name == controller.feedback)
-        theta = self.shaft_angle(channel.part, motion) * channel.gain + channel.offset
-        omega = self.shaft_speed(channel.part, motion.v) * channel.gain
-        angle, speed = self.true_input("reference.theta"), self.true_input("reference.omega")
-        wanted = (0.0 if angle is None else angle, 0.0 if speed is None else speed)
-        if channel.signal == "omega":
-            return ControlSignals(*wanted, 0.0, omega + channel.offset, measures_speed=True)
-        return ControlSignals(*wanted, theta, omega)
-
-    def extra_rates(self, motion: Motion) -> ca.SX:
-        """Return the time derivatives of the continuous states beside motion and bristles."""
-        rates: list[Any] = []
-        for motor in self.drive.motors:
-            if self._has_winding_state(motor):
-                current = motion.extra[self.extra_names.index(f"{motor.name}.current")]
-                emf = motor.torque_constant * self.shaft_speed(motor.shaft, motion.v)
-                driving = self._enabled(motor, self.motor_voltage(motor, motion) - emf)
-                rates.append((driving - motor.resistance * current) / motor.inductance)
-        if "controller.integral" in self.extra_names:
-            controller = self.drive.controller
-            assert controller is not None
-            integral = motion.extra[self.extra_names.index("controller.integral")]
-            rates.append(integral_rate(controller, self.seen(motion), integral))
-        return column(rates)
-
-    def cut(self, extra: ca.SX) -> ca.SX:
-        """Return the continuous states without the winding currents of motors that are not enabled."""
-        kept = list(ca.vertsplit(extra))
-        for motor in self.drive.motors:
-            if self._has_winding_state(motor):
-                k = self.extra_names.index(f"{motor.name}.current")
-                kept[k] = self._enabled(motor, kept[k])
-        return column(kept)
-
 
 def mechanism(drive: Drive) -> Mechanism:
-    """Turn a drive into symbols; every number of the drive becomes a parameter named by its path."""
-    parameters = {leaf.path: symbol(leaf.path) for leaf in drive_leaves(drive) if _is_live(drive, leaf.path)}
-    bound = bind_drive(drive, parameters)
+    """Turn a drive into symbols; every number of its live terms becomes a parameter named by its path.
+
+    Raises FrictionOcpError where friction depends on a temperature that is not an input, or rigid joints form a loop.
+    """
+    live = live_terms(drive)
+    parameters = {leaf.path: symbol(leaf.path) for leaf in drive_leaves(live)}
+    bound = bind_drive(live, parameters)
     structure = topology(bound)
     prescribed = {
         structure.group_of[channel.part]: channel.signal
         for channel in drive.inputs
         if channel.part in structure.group_of and channel.signal in ("theta", "omega")
     }
+    return Mechanism(bound, structure, parameters, _inputs(live, structure), prescribed)
+
+
+def _inputs(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
     inputs: dict[str, ca.SX] = {}
     for channel in drive.inputs:
         inputs[channel.name] = symbol(channel.name)
         if _needs_slope(channel, structure):
             inputs[f"{channel.name}'"] = symbol(f"{channel.name}'")
-    return Mechanism(bound, structure, parameters, inputs, prescribed)
+    if any(_depends_on_time(shaft) for shaft in drive.shafts):
+        inputs[TIME] = symbol(TIME)
+    if findings := list(warm_up_faults(drive)):
+        raise FrictionOcpError(findings)
+    return inputs
 
 
 def _needs_slope(channel: Channel, structure: Topology) -> bool:
     return channel.part in structure.group_of and channel.signal == "theta"
 
 
-def _is_live(drive: Drive, path: str) -> bool:
-    """Zero backlash stays a plain number, so that a transmission without play has no dead zone at all."""
-    return path not in [f"{item.name}.backlash" for item in drive.transmissions if item.backlash == 0.0]
+def _depends_on_time(shaft: Shaft) -> bool:
+    warm_up = shaft.friction.warm_up
+    return shaft.disturbance is not None or (warm_up is not None and warm_up.amplitude is not None)
+
+
+def warm_up_faults(drive: Drive) -> Iterator[Finding]:
+    """Yield what is missing for friction that follows a temperature or settles with time."""
+    measured = any(channel.measures == "temperature" for channel in drive.inputs)
+    for shaft in drive.shafts:
+        warm_up = shaft.friction.warm_up
+        if warm_up is None:
+            continue
+        where = f"{shaft.name}.friction.warm_up"
+        if not is_off(warm_up.per_kelvin) and not measured:
+            what = "friction depends on the temperature, which no input channel measures"
+            remedy = "add a channel with measures: temperature, or leave per_kelvin out"
+            yield Finding(f"{where}.per_kelvin", what, "0 without it", remedy)
+        if not is_off(warm_up.amplitude) and warm_up.time_constant is None:
+            yield Finding(f"{where}.time_constant", "this key is missing", "s, in which the amplitude is approached")

@@ -7,11 +7,13 @@ backlash of a transmission are on its output side; ratio = speed_in / speed_out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.smoothing import cos, sin
 from friction_ocp.friction.static import NoFriction
-from friction_ocp.parameters import Value, quantity
+from friction_ocp.friction.wave import Wave
+from friction_ocp.parameters import Value, is_off, quantity
 
 Motion = Literal["rotary", "linear"]
 ControllerType = Literal["duty", "p", "pd", "pi_velocity", "cascade"]
@@ -35,6 +37,62 @@ class ExternalTorque:
 
 
 @dataclass(frozen=True)
+class Disturbance(Wave):
+    """An external torque periodic in the time since the start of the recording."""
+
+    cosine: Value = quantity("torque", "cosine part of the external torque")
+    sine: Value = quantity("torque", "sine part of the external torque")
+    period: Value = quantity("time", "period of the external torque", nested="guess")
+
+
+@dataclass(frozen=True)
+class Cogging(Wave):
+    """A torque on the motor's shaft periodic in its angle, whether or not there is current."""
+
+    cosine: Value = quantity("torque", "cosine part of the cogging torque")
+    sine: Value = quantity("torque", "sine part of the cogging torque")
+    period: Value = quantity("angle", "period of the cogging torque over the shaft's angle", nested="guess")
+
+
+@dataclass(frozen=True)
+class TorqueRipple(Wave):
+    """Torque of the motor times 1 + a wave over its shaft's angle."""
+
+    cosine: Value = quantity("dimensionless", "cosine part of the relative torque ripple")
+    sine: Value = quantity("dimensionless", "sine part of the relative torque ripple")
+    period: Value = quantity("angle", "period of the torque ripple over the shaft's angle", nested="guess")
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """Once-per-turn error of a sensor: it sees theta + cosine (cos theta - 1) + sine sin theta."""
+
+    cosine: Value = quantity("angle", "cosine part of the once-per-turn error", 0.0)
+    sine: Value = quantity("angle", "sine part of the once-per-turn error", 0.0)
+
+    @property
+    def idle(self) -> bool:
+        """Whether both parts are plainly zero."""
+        return is_off(self.cosine) and is_off(self.sine)
+
+    def error(self, theta: Any) -> Any:
+        """Return what the sensor shows too much."""
+        return self.cosine * (cos(theta) - 1.0) + self.sine * sin(theta)
+
+    def seen(self, motion: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        """Return angle, speed and acceleration as the sensor sees them."""
+        theta, omega, alpha = motion
+        slope = 1.0 - self.cosine * sin(theta) + self.sine * cos(theta)
+        bend = -self.cosine * cos(theta) - self.sine * sin(theta)
+        return theta + self.error(theta), slope * omega, slope * alpha + bend * omega**2
+
+    def undone(self, theta: Any, omega: Any) -> tuple[Any, Any]:
+        """Return true angle and speed from those seen, to third order in the error."""
+        true = theta - self.error(theta - self.error(theta))
+        return true, omega / (1.0 - self.cosine * sin(true) + self.sine * cos(true))
+
+
+@dataclass(frozen=True)
 class Shaft:
     """A rigid body that turns (or moves along a line)."""
 
@@ -44,6 +102,7 @@ class Shaft:
     gravity: Gravity | None = None
     external_torque: ExternalTorque | None = None
     motion: Motion = "rotary"
+    disturbance: Disturbance | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +137,8 @@ class Motor:
     resistance: Value = quantity("resistance", "winding resistance", None)
     inductance: Value = quantity("inductance", "winding inductance", None)
     share: Value = quantity("dimensionless", "share of the command", 1.0)
+    cogging: Cogging | None = None
+    torque_ripple: TorqueRipple | None = None
 
 
 @dataclass(frozen=True)
@@ -99,7 +160,10 @@ class Controller:
 
 @dataclass(frozen=True)
 class Channel:
-    """A recorded signal: recorded(t) = gain * true(t - delay) + offset, quantised by `resolution`."""
+    """A recorded signal: recorded(t) = gain * true(t - delay) + offset, quantised by `resolution`.
+
+    With `eccentricity` true is what an eccentric sensor of the angle sees.
+    """
 
     name: str
     measures: str
@@ -110,6 +174,7 @@ class Channel:
     resolution: float | None = None
     noise_std: float | None = None
     hold: Hold = "linear"
+    eccentricity: Eccentricity | None = None
 
     @property
     def part(self) -> str:

@@ -8,13 +8,18 @@ import casadi as ca
 
 from friction_ocp.drive.coordinates import pick, prescribed_motion
 from friction_ocp.drive.mechanism import Mechanism, Motion, column
+from friction_ocp.drive.motors import seen_by_controller
+from friction_ocp.drive.parts import Channel
 
 
 def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
     """Return the state that measured motion suggests: no twist, bristles as deflected by steady motion."""
     q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    deflections = [shaft.friction.steady_deflection(mech.shaft_speed(shaft.name, v)) for shaft in mech.bristles]
+    deflections = [
+        shaft.friction.under(mech.surroundings(shaft, at)).steady_deflection(mech.shaft_speed(shaft.name, v))
+        for shaft in mech.bristles
+    ]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
     return ca.vertcat(
         pick(q, mech.angle_groups), pick(v, mech.free_groups), column(deflections), at.extra, column(memory)
@@ -24,7 +29,7 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
 def _first_memory(mech: Mechanism, at: Motion, name: str) -> Any:
     if not name.startswith("controller.previous"):
         return 0.0
-    controller, seen = mech.drive.controller, mech.seen(at)
+    controller, seen = mech.drive.controller, seen_by_controller(mech, at)
     assert controller is not None and controller.sample_time is not None
     return seen.theta - (1.0 if name.endswith("1") else 2.0) * controller.sample_time * seen.omega
 
@@ -36,12 +41,13 @@ def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal == "alpha":
             continue
-        ratio = mech.topology.speed_ratio[channel.part] * channel.gain
+        ratio = mech.topology.speed_ratio[channel.part]
         if channel.signal == "theta":
-            q.setdefault(group, (y[k] - channel.offset) / ratio)
-            v[group] = dy[k] / ratio
+            theta, omega = _seen_motion(channel, y[k], dy[k])
+            q.setdefault(group, theta / ratio)
+            v[group] = omega / ratio
         else:
-            v.setdefault(group, (y[k] - channel.offset) / ratio)
+            v.setdefault(group, (y[k] - channel.offset) / channel.gain / ratio)
     for group in mech.prescribed:
         v[group] = prescribed_motion(mech, group, "omega")
         if mech.prescribed[group] == "theta":
@@ -50,6 +56,12 @@ def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX
         _spread(mech, known)
     groups = range(len(mech.topology.roots))
     return column([q.get(g, 0.0) for g in groups]), column([v.get(g, 0.0) for g in groups])
+
+
+def _seen_motion(channel: Channel, y: ca.SX, dy: ca.SX) -> tuple[Any, Any]:
+    """Return true angle and speed of a shaft from a channel that measures its angle."""
+    theta, omega = (y - channel.offset) / channel.gain, dy / channel.gain
+    return (theta, omega) if channel.eccentricity is None else channel.eccentricity.undone(theta, omega)
 
 
 def _spread(mech: Mechanism, known: dict[int, Any]) -> None:

@@ -16,6 +16,7 @@ from friction_ocp.drive.control import apply_tick, compute_tick
 from friction_ocp.drive.coordinates import group_angles, group_speeds, pick
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.motors import cut, extra_rates, motor_current, motor_torque, motor_voltage, seen_by_controller
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.drive.start import start_state
 
@@ -107,20 +108,22 @@ def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Express
     mean = v0
     bristle = mech.deflections(state.bristle)
     extra, v1, load = state.extra, v0, dict[str, Any]()
+    at = Motion(group_angles(mech, free_angles), mean, extra, state.memory, h, mean)
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
         # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
         # to fourth order in its frequencies (Takahashi & Imada 1984)
         middle = group_angles(mech, free_angles + h / 12.0 * pick(v1 - v0, mech.angle_groups))
-        at = Motion(middle, mean, extra, state.memory)
+        at = Motion(middle, mean, extra, state.memory, h, mean)
         done = implicit_kick(mech, Step(h, v0, at, bristle, width))
         v1, load = done.v, done.load
         unknowns += [] if done.unknown is None else [done.unknown]
         mean = done.mean
-        extra = 0.5 * (state.extra + _advance_extra(mech, state, Motion(middle, mean, state.extra, state.memory), h))
+        at = Motion(middle, mean, state.extra, state.memory, h, mean)
+        extra = 0.5 * (state.extra + _advance_extra(mech, state, at, h))
     after = 2.0 * extra - state.extra
     angles = state.angles + h * pick(mean, mech.angle_groups)
-    deflections = _advance_bristles(mech, state, mean, h, load)
+    deflections = _advance_bristles(mech, state, at, load)
     value = ca.vertcat(angles, pick(v1, mech.free_groups), deflections, after, state.memory)
     return _Expression(value, tuple(unknowns))
 
@@ -129,18 +132,19 @@ def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.S
     """Linearly implicit midpoint step of the currents and integrals."""
     if not mech.extra_names:
         return state.extra
-    rates = mech.extra_rates(at)
+    rates = extra_rates(mech, at)
     implicit = ca.SX.eye(rates.numel()) - 0.5 * h * ca.jacobian(rates, state.extra)
-    return mech.cut(state.extra + h * ca.solve(implicit, rates))
+    return cut(mech, state.extra + h * ca.solve(implicit, rates))
 
 
-def _advance_bristles(mech: Mechanism, state: _State, mean: ca.SX, h: ca.SX, load: dict[str, Any]) -> ca.SX:
+def _advance_bristles(mech: Mechanism, state: _State, at: Motion, load: dict[str, Any]) -> ca.SX:
     after: list[Any] = []
     bristle = mech.deflections(state.bristle)
     for shaft in mech.bristles:
-        omega = mech.shaft_speed(shaft.name, mean)
+        omega = mech.shaft_speed(shaft.name, at.v)
         transmitted = transmitted_torque(mech, shaft, load)
-        after.append(shaft.friction.advance(h, omega, omega, bristle[shaft.name], transmitted))
+        friction = shaft.friction.under(mech.surroundings(shaft, at))
+        after.append(friction.advance(at.h, omega, omega, bristle[shaft.name], transmitted))
     return column(after)
 
 
@@ -163,17 +167,18 @@ def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX)
 
 def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> tuple[Any, Any, Any]:
     if channel.signal in ("theta", "omega", "alpha"):
-        omega = mech.shaft_speed(channel.part, at.v)
+        theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at.v)
         alpha = mech.shaft_speed(channel.part, acceleration)
-        theta = mech.shaft_angle(channel.part, at)
+        if channel.eccentricity is not None:
+            theta, omega, alpha = channel.eccentricity.seen((theta, omega, alpha))
         signals = {"theta": (theta, omega, alpha), "omega": (omega, alpha, 0.0), "alpha": (alpha, 0.0, 0.0)}
         return signals[channel.signal]
     motor = mech.drive.motor(channel.part)
     value = {
-        "current": mech.motor_current,
-        "torque": mech.motor_torque,
-        "voltage": mech.motor_voltage,
-    }[channel.signal](motor, at)
+        "current": motor_current,
+        "torque": motor_torque,
+        "voltage": motor_voltage,
+    }[channel.signal](mech, motor, at)
     return value, 0.0, 0.0
 
 
@@ -182,7 +187,7 @@ def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
     assert controller is not None
     at = Motion(group_angles(mech, state.angles), group_speeds(mech, state.speeds), state.extra, state.memory)
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
-    computed, applied = compute_tick(controller, mech.seen(at), memory), apply_tick(controller, memory)
+    computed, applied = compute_tick(controller, seen_by_controller(mech, at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
     return ca.vertcat(state.angles, state.speeds, state.bristle, state.extra, column(chosen))
 

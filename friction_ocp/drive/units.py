@@ -23,6 +23,8 @@ MOTOR_SIGNALS = {
 REFERENCE_SIGNALS = {"theta": "angle", "omega": "speed"}
 
 _KINDS = {"viscous": "damping", "quadratic": "quadratic_damping"}
+_FIXED = {"per_kelvin": "1/K"}
+"""Units of what is not a quantity that can be recorded."""
 _LOAD_VISCOUS: dict[Motion, str] = {"rotary": "s/rad", "linear": "s/m"}
 
 
@@ -39,6 +41,8 @@ def unit_of(leaf: Leaf, drive: Drive) -> str:
             return _LOAD_VISCOUS[motion]
         case "dimensionless" if key == "ratio":
             return _ratio_unit(drive, part)
+        case kind if kind in _FIXED:
+            return _FIXED[kind]
         case kind:
             return si_unit(_KINDS.get(kind, kind), motion)
 

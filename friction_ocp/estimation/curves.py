@@ -10,6 +10,7 @@ import numpy as np
 from friction_ocp.drive.kick import transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion
 from friction_ocp.drive.parts import Shaft
+from friction_ocp.drive.torques import elastic_torque
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.score import FreeRun
 from friction_ocp.friction.smoothing import smooth_abs
@@ -72,7 +73,7 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
         torque = sum(_gravity(mech, name, at) * mech.topology.speed_ratio[name] for name in beyond)
         torque = torque / mech.topology.speed_ratio[joint.to_shaft]
     else:
-        torque = mech.elastic_torque(joint, at, 0.0)
+        torque = elastic_torque(mech, joint, at, 0.0)
     size = transmitted_torque(mech, shaft, {joint.name: ca.SX(torque)})
     inputs = ca.vertcat(*mech.inputs.values())
     function = ca.Function("load", [q, inputs, ca.vertcat(*mech.parameters.values())], [size])

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friction_ocp.drive.mechanism import TIME
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.recording.conditioning import smooth_motion
+from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray, Grid, InputSignal, build_grid
 
 
@@ -48,7 +50,8 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         )
     signals = [_input_signal(use, channel) for channel in inputs]
     samples = np.unique(np.concatenate([recording.channels[channel.name].time for channel in outputs]))
-    grid = build_grid(samples, _with_slopes(signals, inputs, drive), drive.mechanism.drive.controller, max_step)
+    laid = _model_inputs(signals, inputs, drive, _clock(recording))
+    grid = build_grid(samples, laid, drive.mechanism.drive.controller, max_step)
     columns = [_on_nodes(grid, use, channel.name) for channel in outputs]
     motions = [_smooth(grid, use, channel.name) for channel in outputs]
     return Experiment(
@@ -65,12 +68,23 @@ def _input_signal(use: RecordingUse, channel: Channel) -> InputSignal:
     return InputSignal(recorded.time - known_delay(channel), recorded.values, channel.hold == "zero")
 
 
-def _with_slopes(signals: list[InputSignal], inputs: tuple[Channel, ...], drive: SteppedDrive) -> list[InputSignal]:
-    """Add the slope of every input that prescribes an angle, in the order of the model's inputs."""
+def _clock(recording: Recording) -> InputSignal:
+    """Return the time since the start of a recording as an input."""
+    times = [channel.time for channel in recording.channels.values() if channel.time.size]
+    ends = np.array([min(time[0] for time in times), max(time[-1] for time in times)])
+    return InputSignal(ends, ends - ends[0], False)
+
+
+def _model_inputs(
+    signals: list[InputSignal], inputs: tuple[Channel, ...], drive: SteppedDrive, clock: InputSignal
+) -> list[InputSignal]:
+    """Add the time and the slope of every input that prescribes an angle, in the order of the model's inputs."""
     by_name = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
     laid: list[InputSignal] = []
     for name in drive.input_names:
-        if name.endswith("'"):
+        if name == TIME:
+            laid.append(clock)
+        elif name.endswith("'"):
             value, rate, _ = smooth_motion(by_name[name[:-1]].time, by_name[name[:-1]].values)
             laid.append(InputSignal(by_name[name[:-1]].time, rate + 0.0 * value, False))
         else:

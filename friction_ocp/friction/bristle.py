@@ -28,7 +28,7 @@ class LuGre(AbstractFrictionLaw):
     tau_s: Value = quantity("torque", "breakaway torque", nested="tau_c")
     omega_s: Value = quantity("speed", "Stribeck speed", nested="guess")
     sigma0: Value = quantity("stiffness", "bristle stiffness")
-    sigma1: Value = quantity("viscous", "bristle damping", 0.0)
+    sigma1: Value = quantity("damping", "bristle damping", 0.0)
     sigma2: Value = quantity("viscous", "viscous friction", 0.0)
     delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0, nested="guess")
     name: ClassVar[str] = "lugre"

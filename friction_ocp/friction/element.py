@@ -13,8 +13,9 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.friction.bristle import Dahl, LuGre
-from friction_ocp.friction.law import AbstractFrictionLaw, Direction
+from friction_ocp.friction.law import AbstractFrictionLaw, Direction, times
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip, Play
+from friction_ocp.friction.modifiers import Ripple, Surroundings, WarmUp
 from friction_ocp.friction.smoothing import decay_means, positive_part, smooth_abs, smooth_sign, where
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Directional, Value, inline, quantity
@@ -30,6 +31,11 @@ class LoadDependence:
     coulomb: Value = quantity("dimensionless", "Coulomb friction per transmitted torque", 0.0)
     stribeck: Value = quantity("dimensionless", "Stribeck friction per transmitted torque", 0.0, nested=0.0)
     viscous: Value = quantity("load_viscous", "viscous friction per transmitted torque", 0.0)
+
+    def scaled(self, level: Any, viscous: Any) -> LoadDependence:
+        """Return the shares with those of dry friction times `level` and that of the drag times `viscous`."""
+        factors = {"coulomb": level, "stribeck": level, "viscous": viscous}
+        return LoadDependence(**{name: times(getattr(self, name), factor) for name, factor in factors.items()})
 
     def along(self, direction: Direction) -> LoadDependence:
         """Return the shares of one direction of motion."""
@@ -60,6 +66,22 @@ class FrictionElement:
 
     law: AbstractFrictionLaw = inline()
     load: LoadDependence | None = None
+    ripple: Ripple | None = None
+    warm_up: WarmUp | None = None
+
+    def under(self, surroundings: Surroundings) -> FrictionElement:
+        """Return the friction at an angle, time and temperature, as a function of speed and load alone."""
+        if self.ripple is None and self.warm_up is None:
+            return self
+        level: Any = 1.0
+        viscous: Any = 1.0
+        if self.ripple is not None:
+            level = positive_part(1.0 + self.ripple.value(surroundings.theta, surroundings.passed))
+        if self.warm_up is not None:
+            viscous = positive_part(self.warm_up.factor(surroundings))
+            level = level * viscous
+        load = None if self.load is None else self.load.scaled(level, viscous)
+        return FrictionElement(self.law.scaled(level, viscous), load)
 
     def magnitude(self, direction: Direction, speed: Any, transmitted: Any) -> Any:
         """Return the steady-state torque at `speed` >= 0 under the torque |transmitted|."""

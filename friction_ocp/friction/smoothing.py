@@ -31,6 +31,21 @@ def sqrt(value: Any) -> Any:
     return ca.sqrt(value) if isinstance(value, ca.SX) else np.sqrt(value)
 
 
+def sin(value: Any) -> Any:
+    """Sine."""
+    return ca.sin(value) if isinstance(value, ca.SX) else np.sin(value)
+
+
+def cos(value: Any) -> Any:
+    """Cosine."""
+    return ca.cos(value) if isinstance(value, ca.SX) else np.cos(value)
+
+
+def expm1(value: Any) -> Any:
+    """e**value - 1."""
+    return ca.expm1(value) if isinstance(value, ca.SX) else np.expm1(value)
+
+
 def smooth_abs(value: Any, width: Any = 0.0) -> Any:
     """|value|, rounded below `width`, with a finite derivative at zero."""
     return sqrt(value * value + width * width + TINY)
@@ -67,6 +82,14 @@ def power(base: Any, exponent: Any) -> Any:
     return exp(exponent * logarithm)
 
 
+def sinc(value: Any) -> Any:
+    """sin(value) / value, smooth at zero."""
+    large = value * value > 1e-4
+    safe = where(large, value, 1.0)
+    square = value * value
+    return where(large, sin(safe) / safe, 1.0 - square / 6.0 * (1.0 - square / 20.0))
+
+
 def decay_means(decay: Any) -> tuple[Any, Any]:
     """Return (1 - e^-decay) / decay and (1 - that) / decay, for decay >= 0.
 
@@ -74,7 +97,7 @@ def decay_means(decay: Any) -> tuple[Any, Any]:
     """
     large = decay > 1e-2
     safe = where(large, decay, 1.0)
-    exact = -(ca.expm1(-safe) if isinstance(safe, ca.SX) else np.expm1(-safe)) / safe
+    exact = -expm1(-safe) / safe
     first = where(large, exact, 1.0 - decay / 2.0 * (1.0 - decay / 3.0 * (1.0 - decay / 4.0)))
     second = where(large, (1.0 - exact) / safe, 0.5 - decay / 6.0 * (1.0 - decay / 4.0 * (1.0 - decay / 5.0)))
     return first, second

@@ -7,12 +7,13 @@ from itertools import chain
 
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.problem_file.rules import dissipation, excitation, recordings, signals, structure, values
+from friction_ocp.problem_file.rules import dissipation, excitation, recordings, signals, structure, terms, values
 from friction_ocp.problem_file.rules.case import Case, Rule
 
-MODEL = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *dissipation.DISSIPATION, *recordings.NAMES)
+_PARTS = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *dissipation.DISSIPATION, *terms.TERMS)
+MODEL = (*_PARTS, *recordings.NAMES)
 """Rules about what stands in the file, whatever else is missing there."""
-WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE)
+WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 """Rules about what has to be there."""
 
 

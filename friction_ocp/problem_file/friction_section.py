@@ -15,6 +15,7 @@ from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.registry import friction_laws
 from friction_ocp.problem_file.numbers import FrictionNumber, FrictionNumbers
 from friction_ocp.problem_file.sections import Fault, Section, given, refuse, shown
+from friction_ocp.problem_file.term_sections import RippleTerm, WarmUpTerm
 
 
 class LoadSection(Section):
@@ -42,11 +43,14 @@ class FrictionSection(Section):
 
     law: str
     load: LoadSection | None = None
+    ripple: RippleTerm = None
+    warm_up: WarmUpTerm = None
 
     def build(self, law: type[AbstractFrictionLaw]) -> FrictionElement:
-        numbers = given(self, *(name for name in type(self).model_fields if name not in ("law", "load")))
+        numbers = given(self, *(name for name in self.keys() if name not in FrictionSection.model_fields))
         built = {name: _built(value) for name, value in numbers.items()}
-        return FrictionElement(law(**built), None if self.load is None else self.load.build())
+        load = None if self.load is None else self.load.build()
+        return FrictionElement(law(**built), load, self.ripple, self.warm_up)
 
 
 def read_friction(value: Any) -> FrictionElement:

@@ -39,6 +39,7 @@ from friction_ocp.problem_file.sections import (
     refuse,
     shown,
 )
+from friction_ocp.problem_file.term_sections import CoggingTerm, DisturbanceTerm, EccentricityTerm, TorqueRippleTerm
 
 FORMAT = "friction-ocp-problem/1"
 INPUT_ONLY = ("supply_voltage", "enable", "current_command")
@@ -61,6 +62,7 @@ class ShaftSection(Section):
     gravity: GravitySection | None = None
     external_torque: ExternalTorqueSection | None = None
     motion: Motion = "rotary"
+    disturbance: DisturbanceTerm = None
 
     def build(self) -> Shaft:
         friction: dict[str, FrictionElement] = {} if self.friction is None else {"friction": self.friction}
@@ -71,6 +73,7 @@ class ShaftSection(Section):
             gravity=None if gravity is None else Gravity(gravity.torque, gravity.phase),
             external_torque=None if torque is None else ExternalTorque(torque.constant),
             motion=self.motion,
+            disturbance=self.disturbance,
             **friction,
         )
 
@@ -103,10 +106,12 @@ class MotorSection(Section):
     resistance: Number = None
     inductance: Number = None
     share: Number = 1.0
+    cogging: CoggingTerm = None
+    torque_ripple: TorqueRippleTerm = None
 
     def build(self, first_shaft: str) -> Motor:
-        numbers = given(self, "torque_constant", "resistance", "inductance", "share")
-        return Motor(self.name, self.shaft or first_shaft, **numbers)
+        stated = given(self, *(key for key in self.keys() if key not in ("name", "shaft")))
+        return Motor(self.name, self.shaft or first_shaft, **stated)
 
 
 class ControllerSection(Section):
@@ -189,6 +194,7 @@ class ChannelSection(Section):
     resolution: Positive | None = None
     noise_std: Positive | None = None
     hold: Hold = "linear"
+    eccentricity: EccentricityTerm = None
 
     def build(self, name: str) -> Channel:
         """Return the channel; without a role it is an output, or an input where nothing could predict it."""
@@ -198,7 +204,7 @@ class ChannelSection(Section):
             name=name,
             measures=self.measures,
             role=self.role or ("input" if given_only else "output"),
-            **given(self, "gain", "offset", "delay", "resolution", "noise_std", "hold"),
+            **given(self, *(key for key in self.keys() if key not in ("measures", "role"))),
         )
 
 

@@ -7,7 +7,7 @@ import pytest
 from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission, Trajectory
 from twin import Bench, Run, Twin, drive_of
 
-from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft
+from friction_ocp.drive.parts import Channel, Drive, Eccentricity, Motor, Shaft
 
 SHAFT = PlantShaft("motor", 0.01, PlantFriction("coulomb_viscous", tau_c=0.05, viscous=0.01))
 LOAD = PlantShaft("load", 0.2, PlantFriction("coulomb_viscous", tau_c=0.1, viscous=0.05))
@@ -77,3 +77,38 @@ def test_inputs_pass_through_the_same_formula_backwards() -> None:
     run = Bench(drive).run(0.1, {"current": 1.3})
     rounding = 1e-12
     assert run["w"] == pytest.approx(0.5 * 0.5 / 0.01 * run.time, rel=rounding)
+
+
+ECCENTRICITY = Eccentricity(0.02, -0.03)
+
+
+@pytest.mark.parametrize("signal", ["theta", "omega", "alpha"])
+def test_an_eccentric_sensor_shows_the_error_of_its_angle(signal: str) -> None:
+    """Angle, speed and acceleration are those of theta + c (cos theta - 1) + s sin theta, a delay included."""
+    delay = 0.0 if signal == "alpha" else 2e-3
+    channel = Channel("seen", f"axis.{signal}", gain=2.0, offset=0.5, delay=delay, eccentricity=ECCENTRICITY)
+    torque = Channel("torque", "drive.torque", "input")
+    drive = Drive((Shaft("axis", 0.01),), (), (Motor("drive", "axis"),), None, (torque, channel))
+    run = Bench(drive).run(1.0, {"torque": 0.1}, {"axis.omega": 3.0})
+    alpha, time = 10.0, run.time - delay
+    omega, theta = 3.0 + alpha * time, 3.0 * time + 0.5 * alpha * time**2
+    slope, bend = 1 - 0.02 * np.sin(theta) - 0.03 * np.cos(theta), -0.02 * np.cos(theta) + 0.03 * np.sin(theta)
+    seen = {
+        "theta": theta + 0.02 * (np.cos(theta) - 1) - 0.03 * np.sin(theta),
+        "omega": slope * omega,
+        "alpha": slope * alpha + bend * omega**2,
+    }
+    rounding, third_order = 1e-9, 13.0**2 * delay**2
+    assert run["seen"] == pytest.approx(2.0 * seen[signal] + 0.5, abs=rounding + third_order)
+
+
+def test_a_start_sees_through_an_eccentric_sensor() -> None:
+    """The state suggested by an eccentric encoder is the true motion, to third order in the error."""
+    channel = Channel("seen", "axis.theta", gain=2.0, eccentricity=ECCENTRICITY)
+    bench = Bench(Drive((Shaft("axis", 0.01),), channels=(channel,)))
+    theta, omega = 0.7, 3.0
+    seen = theta + 0.02 * (np.cos(theta) - 1) - 0.03 * np.sin(theta)
+    slope = 1 - 0.02 * np.sin(theta) - 0.03 * np.cos(theta)
+    state = np.asarray(bench.stepped.start([2 * seen], [2 * slope * omega], [], bench.numbers)).ravel()
+    third_order = 0.04**3
+    assert state == pytest.approx([theta, omega], abs=third_order)

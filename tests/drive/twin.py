@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantShaft, Trajectory
 
+from friction_ocp.drive.mechanism import TIME
 from friction_ocp.drive.parts import Channel, Controller, Drive, ExternalTorque, Gravity, Motor, Shaft, Transmission
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
@@ -169,7 +170,8 @@ class Bench:
     ) -> Run:
         """Run freely from `initial` (by state name, else zero) with samples `every` s and steps of at most `step` s."""
         samples = every * np.arange(round(duration / every) + 1)
-        signals = [_signal(inputs[name]) for name in self.stepped.input_names]
+        clock = Trajectory(np.array([0.0, duration]), np.array([0.0, duration]), "linear")
+        signals = [_signal({TIME: clock, **inputs}[name]) for name in self.stepped.input_names]
         grid = build_grid(samples, signals, self.drive.controller, step)
         start = np.array([dict(initial or {}).get(name, 0.0) for name in self.stepped.state_names])
         widths = np.full(len(self.stepped.mechanism.topology.roots) + 1, width)

@@ -148,6 +148,37 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(FRICTION, {"law": "coulomb", "tau_c": 1, "load": {"stribeck": 0.1}}),
         "drive.shafts[0].friction.load.stribeck: law 'coulomb' has no Stribeck speed",
     ),
+    "unknown key of a term": (
+        put("drive/motor/cogging", {"cosine": 0.1, "sine": 0, "perod": 1}),
+        "drive.motor.cogging.perod: unknown key 'perod'; available: cosine, sine, period; did you mean 'period'?",
+    ),
+    "period of nothing": (
+        put(f"{SHAFT}/disturbance", {"cosine": 0.1, "sine": 0, "period": 0}),
+        "drive.shafts[0].disturbance.period: disturbance.period = 0 s; must be positive",
+    ),
+    "unmeasured temperature": (
+        put(f"{FRICTION}/warm_up", {"per_kelvin": {"guess": 0}}),
+        "drive.shafts[0].friction.warm_up.per_kelvin: friction depends on the temperature, which no input channel",
+    ),
+    "warm-up without time": (
+        put(f"{FRICTION}/warm_up", {"amplitude": 0.1}),
+        "drive.shafts[0].friction.warm_up.time_constant: this key is missing",
+    ),
+    "eccentric input": (
+        put("channels/current/eccentricity", {"cosine": 0.1}),
+        "channels.current.eccentricity: input channel that measures motor.current; outputs that measure theta",
+    ),
+    "eccentric scale": (
+        several(put(f"{SHAFT}/motion", "linear"), put("channels/position/eccentricity", {"cosine": 0.1})),
+        "channels.position.eccentricity: output channel that measures load.theta; outputs that measure theta, omega or",
+    ),
+    "set of a term that is off": (
+        several(
+            put(f"{SHAFT}/disturbance", {"cosine": 0, "sine": 0, "period": 1}),
+            put("recordings/train", [{"file": "sweep.h5", "set": {"load.disturbance.sine": 1}}]),
+        ),
+        "recordings.train[0].set: 'load.disturbance.sine' is left out of the model, its term being zero",
+    ),
     "unknown part": (
         put("channels/position/measures", "laod.theta"),
         "channels.position.measures: unknown part 'laod'; parts: load, motor, reference; or temperature; did you mean ",
@@ -324,6 +355,10 @@ def test_nothing_to_fit_is_an_error_of_the_check(workshop: Workshop) -> None:
 
 WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
     "no reversal": (put("channels/position/offset", 0.0), "'load' never reverses in training: Coulomb friction cannot"),
+    "ripple of more than all": (
+        put(f"{FRICTION}/ripple", {"cosine": 1, "sine": {"guess": 0.5}, "period": 1}),
+        "drive.shafts[0].friction.ripple: the ripple, 1.12 of the friction, is more than all of it; at most 1",
+    ),
     "break never reached": (
         put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [{"guess": 900}]}),
         "drive.shafts[0].friction.breaks[0]: break 900 rad/s is above the greatest speed in training",

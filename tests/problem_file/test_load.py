@@ -198,3 +198,21 @@ def test_shipped_servo_problems_have_no_finding(path: Path) -> None:
 def test_four_servo_problems_are_shipped() -> None:
     """Plain, Stribeck, load-dependent and both."""
     assert [path.stem for path in SHIPPED] == ["coulomb_viscous", "load_dependent", "stribeck", "stribeck_load"]
+
+
+def test_terms_are_read_under_their_paths(workshop: Workshop) -> None:
+    """Every optional term has its keys, and its numbers the paths that results use."""
+
+    def spoil(content: dict[str, Any]) -> None:
+        wave = {"cosine": 0.01, "sine": {"guess": 0, "min": -1, "max": 1}, "period": 0.5}
+        shaft, motor = content["drive"]["shafts"][0], content["drive"]["motor"]
+        shaft["friction"] |= {"ripple": wave, "warm_up": {"amplitude": 0.1, "time_constant": {"guess": 60}}}
+        shaft["disturbance"] = motor["cogging"] = motor["torque_ripple"] = wave
+        content["channels"]["position"]["eccentricity"] = {"sine": {"expr": "0.1 * motor.cogging.sine"}}
+
+    values = {leaf.path: leaf.value for leaf in drive_leaves(load_problem(workshop.problem(spoil)).drive)}
+    for term in ("load.friction.ripple", "load.disturbance", "motor.cogging", "motor.torque_ripple"):
+        assert [values[f"{term}.{key}"] for key in ("cosine", "sine", "period")] == [0.01, Free(0.0, -1.0, 1.0), 0.5]
+    assert values["load.friction.warm_up.amplitude"] == 0.1
+    assert values["load.friction.warm_up.time_constant"] == Free(60.0)
+    assert values["position.eccentricity.sine"] == Tie("0.1 * motor.cogging.sine")

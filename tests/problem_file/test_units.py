@@ -6,29 +6,64 @@ from dataclasses import replace
 
 import pytest
 
-from friction_ocp.drive.parts import Channel, Controller, ControllerType, Drive, Gravity, Motor, Shaft, Transmission
+from friction_ocp.drive.parts import (
+    Channel,
+    Cogging,
+    Controller,
+    ControllerType,
+    Disturbance,
+    Drive,
+    Eccentricity,
+    Gravity,
+    Motor,
+    Shaft,
+    TorqueRipple,
+    Transmission,
+)
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.friction.static import Quadratic
 
-QUADRATIC = FrictionElement(Quadratic(1.0, 1.0, 1.0), LoadDependence(viscous=0.1))
+RIPPLE, WARM_UP = Ripple(0.1, 0.1, 1.0), WarmUp(0.1, 0.1, 1.0)
+QUADRATIC = FrictionElement(Quadratic(1.0, 1.0, 1.0), LoadDependence(viscous=0.1), RIPPLE, WARM_UP)
 SCREW = Drive(
     shafts=(
         Shaft("motor", 1.0, QUADRATIC, Gravity(1.0)),
-        Shaft("slide", 1.0, QUADRATIC, Gravity(1.0), motion="linear"),
+        Shaft("slide", 1.0, QUADRATIC, Gravity(1.0), motion="linear", disturbance=Disturbance(1.0, 1.0, 1.0)),
     ),
     transmissions=(Transmission("motor", "slide", 100.0, 1.0),),
-    motors=(Motor("servo", "motor", resistance=1.0, inductance=1.0),),
+    motors=(
+        Motor(
+            "servo",
+            "motor",
+            resistance=1.0,
+            inductance=1.0,
+            cogging=Cogging(1.0, 1.0, 1.0),
+            torque_ripple=TorqueRipple(1.0, 1.0, 1.0),
+        ),
+    ),
     channels=(
-        Channel("angle", "motor.theta"),
+        Channel("angle", "motor.theta", eccentricity=Eccentricity(0.1, 0.1)),
         Channel("place", "slide.theta"),
         Channel("push", "slide.alpha"),
         Channel("amps", "servo.current"),
     ),
 )
 EXPECTED = {
+    "motor.friction.ripple.cosine": "1",
+    "slide.friction.ripple.period": "m",
+    "motor.friction.warm_up.per_kelvin": "1/K",
+    "motor.friction.warm_up.reference_temperature": "degC",
+    "motor.friction.warm_up.time_constant": "s",
+    "slide.disturbance.sine": "N",
+    "slide.disturbance.period": "s",
+    "servo.cogging.cosine": "N m",
+    "servo.cogging.period": "rad",
+    "servo.torque_ripple.sine": "1",
+    "angle.eccentricity.sine": "rad",
     "motor.inertia": "kg m^2",
     "slide.inertia": "kg",
     "motor.gravity.torque": "N m",

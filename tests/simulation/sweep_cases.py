@@ -6,11 +6,25 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from friction_ocp.drive.parts import Channel, Controller, Drive, Gravity, Motor, Shaft, Transmission
+from friction_ocp.drive.mechanism import TIME
+from friction_ocp.drive.parts import (
+    Channel,
+    Cogging,
+    Controller,
+    Disturbance,
+    Drive,
+    Eccentricity,
+    Gravity,
+    Motor,
+    Shaft,
+    TorqueRipple,
+    Transmission,
+)
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.friction.static import CoulombViscous, Stribeck
 from friction_ocp.simulation.grid import InputSignal, build_grid
 from friction_ocp.simulation.kernel import SweepRequest
@@ -70,7 +84,19 @@ def sampled() -> Drive:
     return Drive((shaft,), (), (motor,), controller, (reference, Channel("angle", "motor.theta")))
 
 
+def every_term() -> Drive:
+    """A mass with every term that varies with angle, time and temperature."""
+    period, warm_up = 0.4, WarmUp(0.01, -0.3, 0.2, 20.0)
+    friction = FrictionElement(STRIBECK, ripple=Ripple(0.2, -0.1, period), warm_up=warm_up)
+    shaft = Shaft("motor", 0.01, friction, disturbance=Disturbance(0.05, 0.02, 0.1))
+    motor = Motor("motor", "motor", cogging=Cogging(0.02, 0.03, period), torque_ripple=TorqueRipple(0.1, 0.2, period))
+    eccentric = Channel("angle", "motor.theta", delay=1e-3, eccentricity=Eccentricity(0.01, 0.02))
+    warm = Channel("temperature", "temperature", "input")
+    return Drive((shaft,), (), (motor,), None, (TORQUE, warm, eccentric, *outputs("motor.alpha")))
+
+
 DRIVES = {
+    "every term": every_term,
     "one mass": one_mass,
     "two masses": two_masses,
     "lugre": lugre,
@@ -101,7 +127,9 @@ class Case:
         """Return a request with 60 samples at irregular times, one to three substeps each."""
         time = np.cumsum(rng.uniform(1e-3, 9e-3, 60))
         signal = InputSignal(time, 0.6 * np.sin(12.0 * time) + 0.1 * rng.standard_normal(60), False)
-        grid = build_grid(time, [signal], self.drive.controller, 3.5e-3)
+        given = {"temperature": InputSignal(time, 25.0 + 10.0 * time, False), TIME: InputSignal(time, time, False)}
+        signals = [given.get(name, signal) for name in self.model.input_names]
+        grid = build_grid(time, signals, self.drive.controller, 3.5e-3)
         first = np.array([0, 17, 41, grid.time.size - 1])
         x0 = 0.3 * rng.standard_normal((3, len(self.model.state_names)))
         x0[:, [k for k, name in enumerate(self.model.state_names) if name.endswith(".z")]] *= 0.01

@@ -12,7 +12,10 @@ from friction_ocp.friction.law import AbstractFrictionLaw, Direction
 from friction_ocp.parameters import Free, Tie
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 
-_POSITIVE = {"resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero", "width"}
+_POSITIVE = {
+    *("resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"),
+    *("width", "period", "time_constant"),
+}
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash"}
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _SOLVER_TOLERANCE = 1e-6

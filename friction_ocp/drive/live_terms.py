@@ -1,0 +1,51 @@
+"""A drive without the terms that are plainly zero: they cost no symbol, no state and no instruction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.parameters import is_off
+
+
+class _Term(Protocol):
+    @property
+    def idle(self) -> bool: ...
+
+
+Term = TypeVar("Term", bound=_Term)
+
+
+def live_terms(drive: Drive) -> Drive:
+    """Return the drive with None in place of every optional term whose amplitude is a plain zero."""
+    return replace(
+        drive,
+        shafts=tuple(_shaft(item) for item in drive.shafts),
+        transmissions=tuple(_transmission(item) for item in drive.transmissions),
+        motors=tuple(_motor(item) for item in drive.motors),
+        channels=tuple(_channel(item) for item in drive.channels),
+    )
+
+
+def _live(term: Term | None) -> Term | None:
+    return None if term is None or term.idle else term
+
+
+def _shaft(shaft: Shaft) -> Shaft:
+    friction, warm_up = shaft.friction, _live(shaft.friction.warm_up)
+    warm_up = None if warm_up is None else warm_up.live()
+    friction = replace(friction, ripple=_live(friction.ripple), warm_up=warm_up)
+    return replace(shaft, friction=friction, disturbance=_live(shaft.disturbance))
+
+
+def _transmission(item: Transmission) -> Transmission:
+    return replace(item, backlash=None if is_off(item.backlash) else item.backlash)
+
+
+def _motor(motor: Motor) -> Motor:
+    return replace(motor, cogging=_live(motor.cogging), torque_ripple=_live(motor.torque_ripple))
+
+
+def _channel(channel: Channel) -> Channel:
+    return replace(channel, eccentricity=_live(channel.eccentricity))

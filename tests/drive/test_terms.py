@@ -1,0 +1,270 @@
+"""Optional terms of parts in smooth motion: the stepped drive against an adaptive solver of independent equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from plant import Trajectory
+from scipy.integrate import solve_ivp
+from twin import Bench
+
+from friction_ocp.drive.dae_form import dae
+from friction_ocp.drive.mechanism import TIME
+from friction_ocp.drive.parts import (
+    Channel,
+    Cogging,
+    Disturbance,
+    Drive,
+    Eccentricity,
+    Motor,
+    Shaft,
+    TorqueRipple,
+)
+from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.friction.bristle import LuGre
+from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.modifiers import Ripple, WarmUp
+from friction_ocp.friction.static import Coulomb, CoulombViscous, Polyline, Stribeck
+from friction_ocp.parameters import Free
+
+DURATION = 0.4
+STEP_ERROR = 3e-4
+"""Relative error of the second-order step of 1 ms on these motions."""
+ORDER = 1.8
+"""Order 2 less what the third order contributes at 2 ms."""
+J, BASE, RAMP, TEMPERATURE = 0.01, 0.35, 0.9, 35.0
+INPUTS = {
+    "torque": Trajectory(np.array([0.0, DURATION]), np.array([BASE, BASE + RAMP * DURATION]), "linear"),
+    "temperature": TEMPERATURE,
+}
+Rates = Callable[[float, Sequence[float]], list[float]]
+
+
+def command(t: float) -> float:
+    return BASE + RAMP * t
+
+
+def wave(amplitudes: tuple[float, float], period: float, at: float) -> float:
+    cosine, sine = amplitudes
+    return float(cosine * np.cos(2 * np.pi * at / period) + sine * np.sin(2 * np.pi * at / period))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A drive, its states at the start in their order, and the same motion as differential equations."""
+
+    drive: Drive
+    initial: dict[str, float]
+    rates: Rates
+
+    def exact(self) -> np.ndarray:
+        """Return (states, samples) every 4 ms."""
+        times = np.linspace(0.0, DURATION, 101)
+        start = list(self.initial.values())
+        return solve_ivp(self.rates, (0.0, DURATION), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
+
+    def errors(self, step: float) -> np.ndarray:
+        """Return the root mean square error of every state over that of the state."""
+        run = Bench(self.drive).run(DURATION, INPUTS, self.initial, step, every=4e-3)
+        exact = self.exact()
+        found = np.array([run[name] for name in self.initial])
+        return np.sqrt(np.mean((found - exact) ** 2, axis=1) / np.mean(exact**2, axis=1))
+
+
+def axis(friction: FrictionElement, motor: Motor | None = None, shaft: Shaft | None = None) -> Drive:
+    """One mass under a torque."""
+    shaft = replace(shaft or Shaft("axis", J), friction=friction)
+    channels = (Channel("torque", "servo.torque", "input"), Channel("temperature", "temperature", "input"))
+    return Drive((shaft,), (), (motor or Motor("servo", "axis"),), None, (*channels, Channel("theta", "axis.theta")))
+
+
+MOVING = {"axis.theta": 0.3, "axis.omega": 8.0}
+LAW = CoulombViscous(0.1, 0.02)
+PLAIN = FrictionElement(LAW)
+AMPLITUDES, PERIOD = (0.2, -0.3), 0.9
+WARM = WarmUp(0.01, -0.3, 0.15, 20.0)
+
+
+def one_mass(torque: Callable[[float, float, float], float]) -> Rates:
+    """Return the equations of one mass under torque(t, theta, omega)."""
+    return lambda t, x: [x[1], torque(t, x[0], x[1]) / J]
+
+
+def warmth(t: float) -> float:
+    return 1 + 0.01 * (TEMPERATURE - 20) - 0.3 * (1 - np.exp(-t / 0.15))
+
+
+def bristle(t: float, x: Sequence[float]) -> list[float]:
+    theta, omega, z = x
+    level = (0.1 + 0.05 * np.exp(-((omega / 2.0) ** 2))) * (1 + wave(AMPLITUDES, PERIOD, theta)) * warmth(t)
+    rate = omega - 1.0 * abs(omega) / level * z
+    return [omega, (command(t) - 1.0 * z - 0.05 * rate - 0.01 * warmth(t) * omega) / J, rate]
+
+
+CASES: dict[str, Case] = {
+    "cogging": Case(
+        axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) + wave((0.05, 0.08), PERIOD, q) - 0.1 - 0.02 * v),
+    ),
+    "torque ripple": Case(
+        axis(PLAIN, Motor("servo", "axis", share=0.9, torque_ripple=TorqueRipple(*AMPLITUDES, PERIOD))),
+        MOVING,
+        one_mass(lambda t, q, v: 0.9 * command(t) * (1 + wave(AMPLITUDES, PERIOD, q)) - 0.1 - 0.02 * v),
+    ),
+    "disturbance": Case(
+        axis(PLAIN, shaft=Shaft("axis", J, disturbance=Disturbance(0.1, -0.06, 0.07))),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) + wave((0.1, -0.06), 0.07, t) - 0.1 - 0.02 * v),
+    ),
+    "friction ripple": Case(
+        axis(FrictionElement(LAW, ripple=Ripple(*AMPLITUDES, PERIOD))),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) - 0.1 * (1 + wave(AMPLITUDES, PERIOD, q)) - 0.02 * v),
+    ),
+    "friction ripple, stribeck": Case(
+        axis(FrictionElement(Stribeck(0.1, 0.2, 6.0, 0.02), ripple=Ripple(*AMPLITUDES, PERIOD))),
+        MOVING,
+        one_mass(
+            lambda t, q, v: (
+                command(t) - (0.1 + 0.1 * np.exp(-((v / 6.0) ** 2))) * (1 + wave(AMPLITUDES, PERIOD, q)) - 0.02 * v
+            )
+        ),
+    ),
+    "warm-up": Case(
+        axis(FrictionElement(LAW, warm_up=WARM)),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) - (0.1 + 0.02 * v) * warmth(t)),
+    ),
+    "warm-up and ripple, polyline": Case(
+        axis(FrictionElement(Polyline(0.1, (0.02,)), ripple=Ripple(*AMPLITUDES, PERIOD), warm_up=WARM)),
+        MOVING,
+        one_mass(
+            lambda t, q, v: command(t) - (0.1 * (1 + wave(AMPLITUDES, PERIOD, q)) + 0.02 * v) * warmth(t),
+        ),
+    ),
+    "warm-up and ripple, lugre": Case(
+        axis(FrictionElement(LuGre(0.1, 0.15, 2.0, 1.0, 0.05, 0.01), ripple=Ripple(*AMPLITUDES, PERIOD), warm_up=WARM)),
+        {"axis.theta": 0.3, "axis.omega": 3.0, "axis.friction.z": 0.02},
+        bristle,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_terms_follow_their_equations_to_second_order(name: str) -> None:
+    """With every term the step has its equations as limit, and halving it quarters the error."""
+    coarse, fine = (CASES[name].errors(step) for step in (2e-3, 1e-3))
+    assert fine.max() < STEP_ERROR
+    assert np.log2(coarse / fine).min() > ORDER
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_continuous_form_has_the_same_equations(name: str) -> None:
+    """In motion the rates of the differential-algebraic form are those of the independent equations."""
+    case = CASES[name]
+    model, at, width = dae(case.drive, 1e-9), 0.13, 1e-6
+    numbers = {leaf.path: leaf.value for leaf in drive_leaves(case.drive)}
+    values = {**numbers, **case.initial, "torque": command(at), "temperature": TEMPERATURE, TIME: at}
+    groups = (model.states, model.algebraic, model.inputs, model.parameters)
+    ode, _, _ = model.function()(*(model.stack(group, values) for group in groups))
+    names = [variable.name for variable in model.states]
+    found = dict(zip(names, np.asarray(ode).ravel(), strict=True))
+    wanted = dict(zip(case.initial, case.rates(at, list(case.initial.values())), strict=True))
+    assert found == pytest.approx(wanted, rel=width)
+    assert {item.name: item.unit for item in model.inputs}.get(TIME, "s") == "s"
+
+
+def step_of(drive: Drive) -> tuple[SteppedDrive, np.ndarray]:
+    made = stepped(drive)
+    values = {leaf.path: leaf.value for leaf in drive_leaves(drive)}
+    numbers = [getattr(values[name], "guess", values[name]) for name in made.parameter_names]
+    return made, np.array(numbers, dtype=float)
+
+
+ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
+    "axis.friction.ripple": lambda off: axis(FrictionElement(LAW, ripple=Ripple(off, off, PERIOD))),
+    "axis.friction.warm_up": lambda off: axis(FrictionElement(LAW, warm_up=WarmUp(off, off, 0.2))),
+    "servo.cogging": lambda off: axis(PLAIN, Motor("servo", "axis", cogging=Cogging(off, off, PERIOD))),
+    "servo.torque_ripple": lambda off: axis(PLAIN, Motor("servo", "axis", torque_ripple=TorqueRipple(off, off, 0.9))),
+    "axis.disturbance": lambda off: axis(PLAIN, shaft=Shaft("axis", J, disturbance=Disturbance(off, off, 0.2))),
+    "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
+}
+AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude")
+
+
+def sensed(eccentricity: Eccentricity | None) -> Drive:
+    drive = axis(PLAIN)
+    return replace(
+        drive, channels=(*drive.channels[:-1], replace(drive.channels[-1], eccentricity=eccentricity, delay=1e-3))
+    )
+
+
+@pytest.mark.parametrize("name", ZERO_TERMS)
+def test_a_plain_zero_costs_nothing(name: str) -> None:
+    """A term whose amplitudes are plain zeros leaves no number, input, state or instruction behind."""
+    off, _ = step_of(ZERO_TERMS[name](0.0))
+    absent, _ = step_of(sensed(None) if "eccentricity" in name else axis(PLAIN))
+    for made in ("parameter_names", "input_names", "state_names"):
+        assert getattr(off, made) == getattr(absent, made)
+    assert off.step.n_instructions() == absent.step.n_instructions()
+    assert off.output.n_instructions() == absent.output.n_instructions()
+
+
+@pytest.mark.parametrize("omega", [0.0, 4.0])
+@pytest.mark.parametrize("name", ZERO_TERMS)
+def test_a_fitted_zero_can_be_scored(name: str, omega: float) -> None:
+    """At a guess of 0 every amplitude has a finite derivative, in motion that of a difference quotient and not 0."""
+    made, numbers = step_of(ZERO_TERMS[name](Free(0.0)))
+    x, p = (ca.SX.sym(symbol, size) for symbol, size in (("x", len(made.state_names)), ("p", numbers.size)))
+    u = [{"torque": 0.4, "temperature": 30.0, TIME: 0.13}[item] for item in made.input_names]
+    after = ca.vertcat(made.step(x, u, p, 1e-3, [0, 0]), made.output(x, u, p, 1e-3, [0, 0]))
+    function = ca.Function("after", [x, p], [after, ca.jacobian(after, p)])
+    state = [0.4, omega]
+    _, slope = function(state, numbers)
+    slope = np.asarray(slope)
+    assert np.all(np.isfinite(slope))
+    for k in [k for k, path in enumerate(made.parameter_names) if path.startswith(name) and path.endswith(AMPLITUDE)]:
+        beside, curvature = 1e-5, 1e-4
+        more, less = (function(state, numbers + sign * beside * np.eye(numbers.size)[k])[0] for sign in (1, -1))
+        quotient = np.asarray(more - less).ravel() / (2 * beside)
+        assert omega == 0.0 or np.any(quotient != 0.0)
+        assert slope[:, k] == pytest.approx(quotient, rel=curvature, abs=curvature * np.abs(quotient).max())
+
+
+def test_a_shaft_sticks_up_to_the_friction_of_its_angle() -> None:
+    """Under a slow ramp the speed is exactly 0 until the torque passes the Coulomb friction of that very angle."""
+    ripple = Ripple(*AMPLITUDES, PERIOD)
+    drive = axis(FrictionElement(Coulomb(0.1), ripple=ripple))
+    for theta in (0.1, 0.4):
+        level = 0.1 * (1 + wave(AMPLITUDES, PERIOD, theta))
+        ramp = Trajectory(np.array([0.0, 1.0]), np.array([0.0, 0.2]), "linear")
+        run = Bench(drive).run(1.0, {"torque": ramp, "temperature": TEMPERATURE}, {"axis.theta": theta})
+        held = 0.2 * run.time < level - 1e-9
+        assert np.all(run["axis.omega"][held] == 0.0) and np.all(run["axis.theta"][held] == theta)
+        assert np.all(run["axis.omega"][0.2 * run.time > level + 1e-3] > 0.0)
+
+
+def test_friction_that_vanishes_does_not_push() -> None:
+    """Where a ripple takes more than all of the friction, the shaft turns freely."""
+    drive = axis(FrictionElement(Coulomb(0.1), ripple=Ripple(-2.0, 0.0, 100.0)))
+    run = Bench(drive).run(0.1, {"torque": 0.0, "temperature": 20.0}, {"axis.omega": 1.0})
+    assert np.all(run["axis.omega"] == 1.0)
+
+
+def test_what_a_term_needs_is_asked_for() -> None:
+    """Friction that follows the temperature needs a channel for it, one that settles a time constant."""
+    drive = axis(FrictionElement(LAW, warm_up=WarmUp(0.01, 0.1)))
+    with pytest.raises(FrictionOcpError) as refusal:
+        stepped(replace(drive, channels=(drive.channels[0], drive.channels[2])))
+    assert [finding.where for finding in refusal.value.findings] == [
+        "axis.friction.warm_up.per_kelvin",
+        "axis.friction.warm_up.time_constant",
+    ]
