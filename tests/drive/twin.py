@@ -4,18 +4,42 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantShaft, Trajectory
+from plant import (
+    Plant,
+    PlantController,
+    PlantFriction,
+    PlantMotor,
+    PlantRipple,
+    PlantSensor,
+    PlantShaft,
+    PlantWarmUp,
+    Trajectory,
+)
 
 from friction_ocp.drive.mechanism import TIME
-from friction_ocp.drive.parts import Channel, Controller, Drive, ExternalTorque, Gravity, Motor, Shaft, Transmission
+from friction_ocp.drive.parts import (
+    Channel,
+    Cogging,
+    Controller,
+    Disturbance,
+    Drive,
+    Eccentricity,
+    ExternalTorque,
+    Gravity,
+    Motor,
+    Shaft,
+    TorqueRipple,
+    Transmission,
+)
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.gms import MaxwellElement
+from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.friction.registry import friction_laws
 from friction_ocp.friction.static import Polyline
 from friction_ocp.parameters import Directional
@@ -62,13 +86,36 @@ def friction_of(friction: PlantFriction) -> FrictionElement:
     return FrictionElement(friction_laws()[friction.law](**numbers), load)
 
 
+def _wave(term: type[Any], ripple: PlantRipple | None) -> Any:
+    return None if ripple is None else term(ripple.cosine, ripple.sine, ripple.period)
+
+
+def _warm_up(warm_up: PlantWarmUp | None) -> WarmUp | None:
+    if warm_up is None:
+        return None
+    assert warm_up.dry == warm_up.viscous and warm_up.power == 0.0
+    return WarmUp(0.0, warm_up.dry, warm_up.time_constant)
+
+
+def _eccentric(sensor: PlantSensor) -> Channel:
+    """Return the channel of a sensor; ours shows no error at the angle 0, the plant's one of mean zero."""
+    wave, offset = sensor.eccentricity, sensor.offset
+    if wave is not None and sensor.measures.endswith(".theta"):
+        offset += sensor.gain * wave.cosine
+    eccentricity = None if wave is None else Eccentricity(wave.cosine, wave.sine)
+    known = (sensor.name, sensor.measures, "output", sensor.gain, offset, sensor.delay, sensor.resolution)
+    return Channel(*known, eccentricity=eccentricity)
+
+
 def _shaft(shaft: PlantShaft) -> Shaft:
+    friction = friction_of(shaft.friction)
     return Shaft(
         shaft.name,
         shaft.inertia,
-        friction_of(shaft.friction),
+        replace(friction, ripple=_wave(Ripple, shaft.ripple), warm_up=_warm_up(shaft.warm_up)),
         Gravity(*shaft.gravity) if any(shaft.gravity) else None,
         ExternalTorque(shaft.external_torque) if shaft.external_torque else None,
+        disturbance=_wave(Disturbance, shaft.disturbance),
     )
 
 
@@ -81,6 +128,8 @@ def _motor(motor: PlantMotor) -> Motor:
         motor.resistance if voltage else None,
         (motor.inductance or None) if voltage else None,
         motor.share,
+        _wave(Cogging, motor.cogging),
+        _wave(TorqueRipple, motor.torque_ripple),
     )
 
 
@@ -103,7 +152,7 @@ def _controller(controller: PlantController, output: str) -> Controller:
 def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
     """Return the drive under test: inputs by their signals; outputs are the plant's sensors, all angles and speeds."""
     driven = [Channel(name, name, "input") for name in inputs]
-    sensors = [Channel(s.name, s.measures, "output", s.gain, s.offset, s.delay, s.resolution) for s in plant.sensors]
+    sensors = [_eccentric(sensor) for sensor in plant.sensors]
     seen = [f"{shaft.name}.{signal}" for shaft in plant.shafts for signal in ("theta", "omega")]
     seen = [name for name in seen if name not in inputs]
     if any(c.type == "duty" for c in plant.controllers):

@@ -62,7 +62,7 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "unknown key": (
         put(f"{SHAFT}/inerta", 1.0),
         "drive.shafts[0].inerta: unknown key 'inerta'; available: name, inertia, friction, gravity, external_torque, "
-        "motion; did you mean 'inertia'?",
+        "motion, disturbance; did you mean 'inertia'?",
     ),
     "unknown key of a law": (put(f"{FRICTION}/sigma0", 1.0), "drive.shafts[0].friction.sigma0: unknown key 'sigma0'; "),
     "unknown law": (
