@@ -12,7 +12,7 @@ from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
-from friction_ocp.estimation.fit import Fitted, fit, program_builder
+from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
@@ -23,6 +23,7 @@ from friction_ocp.estimation.noise import NoiseFloor
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
+from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of

@@ -25,6 +25,8 @@ class Solution:
     iterations: int
     converged: bool
     message: str
+    smooth: bool = True
+    """Whether it ended where the quadratic model expects nothing more, not at a kink."""
 
 
 Watch = Callable[[int, float, Point], None]
@@ -67,7 +69,8 @@ def solve_gauss_newton(
         point, system, damping = accepted.point, accepted.system, accepted.damping
         slow = slow + 1 if gained <= tolerances.progress * system.objective else 0
         if slow >= 3:
-            return Solution(point, system.objective, iteration, True, "three steps in a row gained next to nothing")
+            text = "three steps in a row gained next to nothing"
+            return Solution(point, system.objective, iteration, True, text, smooth=False)
         if watch is not None:
             watch(iteration, system.objective, point)
     return Solution(point, system.objective, iteration, False, "iteration limit reached")
@@ -103,7 +106,8 @@ def _stuck(program: Program, point: Point, system: Linearisation, iteration: int
     _, predicted = trial_step(program.space, point, system, 1e-6)
     relative = predicted / max(system.objective, 1e-300)
     if relative <= tolerances.stalled or predicted <= tolerances.negligible:
-        return Solution(point, system.objective, iteration, True, "no step decreases the objective further")
+        text = "no step decreases the objective further"
+        return Solution(point, system.objective, iteration, True, text, smooth=False)
     text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
     return Solution(point, system.objective, iteration, False, text)
 

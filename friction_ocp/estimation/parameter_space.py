@@ -14,7 +14,7 @@ from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.expressions import parse, resolve_ties
 from friction_ocp.parameters import Free, Leaf, Tie
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,11 @@ class ParameterSpace:
     def clip(self, theta: FloatArray) -> FloatArray:
         """Return the nearest point inside the bounds."""
         return np.clip(theta, self.lower, self.upper)
+
+    def at_bounds(self, theta: FloatArray) -> BoolArray:
+        """Return which parameters lie on one of their bounds, (parameters,)."""
+        span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, np.abs(theta) + 1.0)
+        return (theta - self.lower <= 1e-6 * span) | (self.upper - theta <= 1e-6 * span)
 
     def moved(self, start: FloatArray) -> ParameterSpace:
         """Return the space with another start; priors and bounds stay."""

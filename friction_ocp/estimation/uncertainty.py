@@ -54,12 +54,6 @@ class Uncertainty:
         return np.column_stack([theta - reach, theta + reach])
 
 
-def at_bounds(space: ParameterSpace, theta: FloatArray) -> BoolArray:
-    """Return which parameters lie on one of their bounds."""
-    span = np.where(np.isfinite(space.upper - space.lower), space.upper - space.lower, np.abs(theta) + 1.0)
-    return (theta - space.lower <= 1e-6 * span) | (space.upper - theta <= 1e-6 * span)
-
-
 def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, white: bool, absolute: bool) -> Uncertainty:
     """Return the covariance on the parameters that are not at a bound.
 
@@ -69,7 +63,7 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
     information = found.information
     if absolute:
         information = found.jacobian.T @ (_density_weight(found)[:, None] * found.jacobian) + found.prior
-    bound = at_bounds(space, theta)
+    bound = space.at_bounds(theta)
     free = ~bound
     told, untold = _inverse(information[np.ix_(free, free)])
     covariance = np.full(information.shape, np.nan)

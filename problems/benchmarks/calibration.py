@@ -46,6 +46,8 @@ SECONDS, RATE = 4.0, 1000.0
 TORQUE_CONSTANT, MOTOR_INERTIA, LOAD_INERTIA, RATIO = 0.35, 0.002, 4.0, 50.0
 STIFFNESS, DAMPING, LOAD_VISCOUS = 2.0e4, 20.0, 5.0
 ENCODER_NOISE = {"motor": 1.0e-2, "load": 2.0e-4}
+FINER = {"dahl": 0.2, "lugre": 0.2}
+"""Noise over ENCODER_NOISE where a bristle's deflection, 5e-3 rad, has to be seen."""
 
 TRUTH: dict[str, dict[str, Any]] = {
     "none": {},
@@ -68,6 +70,10 @@ class Case:
     law: str
     masses: int
 
+    def noise(self, shaft: str) -> float:
+        """Return the standard deviation of the encoder on a shaft, rad."""
+        return ENCODER_NOISE[shaft] * FINER.get(self.law, 1.0)
+
     @property
     def name(self) -> str:
         """How the table calls it."""
@@ -80,12 +86,12 @@ def make_plant(case: Case) -> Plant:
     if "sigma2" in values:
         values["viscous"] = values.pop("sigma2")
     motor = PlantShaft("motor", MOTOR_INERTIA, PlantFriction(case.law, **values))
-    sensors = [PlantSensor("motor_position", "motor.theta", period=1 / RATE, noise_std=ENCODER_NOISE["motor"])]
+    sensors = [PlantSensor("motor_position", "motor.theta", period=1 / RATE, noise_std=case.noise("motor"))]
     shafts, transmissions = [motor], []
     if case.masses == 2:
         shafts.append(PlantShaft("load", LOAD_INERTIA, PlantFriction("viscous", viscous=LOAD_VISCOUS)))
         transmissions.append(PlantTransmission("motor", "load", ratio=RATIO, stiffness=STIFFNESS, damping=DAMPING))
-        sensors.append(PlantSensor("load_position", "load.theta", period=1 / RATE, noise_std=ENCODER_NOISE["load"]))
+        sensors.append(PlantSensor("load_position", "load.theta", period=1 / RATE, noise_std=case.noise("load")))
     return Plant(
         shafts=tuple(shafts),
         transmissions=tuple(transmissions),
@@ -126,7 +132,7 @@ def make_problem(
     transmissions: list[Transmission] = []
     channels = [
         Sensor("current", "drive.current", role="input", hold=hold),  # pyright: ignore[reportArgumentType]
-        Sensor("motor_position", "motor.theta", noise_std=ENCODER_NOISE["motor"]),
+        Sensor("motor_position", "motor.theta", noise_std=case.noise("motor")),
     ]
     if case.masses == 2:
         viscous = friction_laws()["viscous"](viscous=free("load.friction.viscous", LOAD_VISCOUS))  # pyright: ignore[reportCallIssue]
@@ -134,7 +140,7 @@ def make_problem(
         stiffness = free("motor-load.stiffness", STIFFNESS)
         damping = free("motor-load.damping", DAMPING)
         transmissions.append(Transmission("motor", "load", ratio=RATIO, stiffness=stiffness, damping=damping))
-        channels.append(Sensor("load_position", "load.theta", noise_std=ENCODER_NOISE["load"]))
+        channels.append(Sensor("load_position", "load.theta", noise_std=case.noise("load")))
     drive = Drive(
         tuple(shafts), tuple(transmissions), (Motor("drive", "motor", TORQUE_CONSTANT),), channels=tuple(channels)
     )

@@ -24,8 +24,9 @@ from checks import Check, print_rows, tell_status
 from parameter_box import FloatArray, ParameterBox
 
 from friction_ocp.estimation.estimate import conclude
-from friction_ocp.estimation.fit import Fitted, fit
+from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.estimation.stages import mean_error
 from friction_ocp.problem_file.load import load_problem
 

@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.stats
 from regressions import autoregressive, regression, space
 
-from friction_ocp.estimation.uncertainty import Uncertainty, at_bounds, uncertainty
+from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 
 ROUNDING = 1e-9
 SCATTER = 0.2
@@ -100,7 +100,7 @@ def test_bounds_are_reached_within_rounding_of_their_span() -> None:
     """Upper, lower and absent bounds."""
     theta = np.array([0.0, 1e-7, 1e-3, 1.0, 5.0])
     bounded = space(theta, np.array([0, 0, 0, 0, -np.inf]), np.array([1, 1, 1, 1, np.inf]))
-    assert at_bounds(bounded, theta).tolist() == [True, True, False, True, False]
+    assert bounded.at_bounds(theta).tolist() == [True, True, False, True, False]
 
 
 @pytest.mark.parametrize("white", [True, False])

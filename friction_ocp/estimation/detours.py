@@ -1,0 +1,69 @@
+"""Ways out of an end that exact friction or a loss with kinks makes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.gauss_newton import solve_gauss_newton
+from friction_ocp.estimation.losses import Absolute, Squares
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.rounds import COARSE, Fitted, final_solver, limits
+from friction_ocp.estimation.stages import ROUNDINGS, mean_error
+from friction_ocp.simulation.grid import FloatArray
+
+DETOURS = (0.05, 0.01, 0.0025)
+"""Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
+HOPS = (0.005, 0.02, 0.05, 0.005, 0.02, 0.05)
+"""Restarts around the best end of a loss with kinks: by what share the quadratic model calls them worse."""
+
+
+def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
+    """Leave an end at a kink of exact friction: through the same program with a smoothed sign, and back."""
+    program, best = fitted.program, fitted.solution
+    for width in DETOURS:
+        if best.smooth or not isinstance(program.loss, Squares):
+            break
+        watch = phases.begin(f"detour, smoothing {width:g}")
+        rounded = replace(program, width=width * model.speed_scale)
+        between = solve_gauss_newton(rounded, best.point, COARSE, watch)
+        end = final_solver(model)(program, between.point, limits(model), watch)
+        iterations = best.iterations + between.iterations + end.iterations
+        best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
+    return replace(fitted, solution=best)
+
+
+def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
+    """Leave local minima of a loss with kinks: restart from points that the quadratic model calls slightly worse."""
+    program, best, iterations = fitted.program, fitted.solution, fitted.solution.iterations
+    if not isinstance(program.loss, Absolute):
+        return fitted
+    rng = np.random.default_rng(model.problem.estimation.seed)
+    size = mean_error(program, best.point)
+    softer = [replace(program, loss=Absolute(rounding * size)) for rounding in ROUNDINGS[2:-1]]
+    for k, hop in enumerate(HOPS):
+        watch = phases.begin(f"hop {k + 1} of {len(HOPS)}")
+        reduced = reduce_system(program.linearise(best.point), 1e-6)
+        step = _on_ellipsoid(reduced.hessian, 2.0 * hop * best.objective, rng)
+        theta = model.space.clip(best.point.theta + step)
+        nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
+        point = Point(theta, nodes)
+        for stage in softer:
+            point = solve_gauss_newton(stage, point, COARSE, watch).point
+        end = solve_gauss_newton(program, point, limits(model), watch)
+        iterations += end.iterations
+        best = min(best, end, key=lambda solution: solution.objective)
+    return Fitted(replace(best, iterations=iterations), program)
+
+
+def _on_ellipsoid(hessian: FloatArray, size: float, rng: np.random.Generator) -> FloatArray:
+    """Return a random d with d'Hd = size."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    values, vectors = np.linalg.eigh(hessian * np.outer(scale, scale))
+    direction = rng.standard_normal(scale.size)
+    direction *= np.sqrt(size) / np.linalg.norm(direction)
+    return scale * (vectors @ (direction / np.sqrt(np.maximum(values, 1e-8))))

@@ -1,0 +1,147 @@
+"""Rounds of a fit: programs one after another, from several starts, each sharper than the one before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
+from friction_ocp.estimation.horizon import fits_free_run, horizon
+from friction_ocp.estimation.losses import AbstractLoss, Squares
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.parameter_space import nested_space
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.release import released
+from friction_ocp.estimation.stages import WIDTHS, free_run, loss_of_round, mean_error, predictions, relaxed, rounds_of
+from friction_ocp.simulation.grid import FloatArray
+
+COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
+FINE = Tolerances()
+RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
+"""Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
+AT_NOISE = 1.5
+"""Mean square error over the noise floor up to which a fit needs no rivals."""
+FINALISTS = 5
+"""Starts that are followed to the end."""
+
+Builder = Callable[[Model, float, AbstractLoss], Program]
+Solve = Callable[[Program, Point, Tolerances, Watch], Solution]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The solution and the program that it solves: exact friction, the loss asked for."""
+
+    solution: Solution
+    program: Program
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which program is solved with which smoothing widths, one after another."""
+
+    builder: Builder
+    widths: tuple[float, ...]
+    conclusive: bool
+    """Whether small residuals prove the parameters right: gaps of an assumed size between segments hide errors."""
+
+
+def joined(model: Model, width: float, loss: AbstractLoss) -> Program:
+    """Return the program of relaxed segments."""
+    return relaxed(model, model.train, width, loss)
+
+
+def windowed(span: float | None) -> Builder:
+    """Return what makes the program of free runs over windows of `span` s; None is the whole recording."""
+    return lambda model, width, loss: free_run(model, model.train, width, loss, span)
+
+
+def program_builder(model: Model) -> Builder:
+    """Return what makes the program that a fit ends with."""
+    return windowed(horizon(model)) if fits_free_run(model) else joined
+
+
+def final_solver(model: Model) -> Solve:
+    """Return what solves the programs of a fit: the structured solver, or Ipopt where the problem asks for it."""
+    if model.problem.estimation.solver == "gauss_newton":
+        return solve_gauss_newton
+    from friction_ocp.estimation.ipopt import solve_ipopt
+
+    return solve_ipopt
+
+
+def limits(model: Model) -> Tolerances:
+    return replace(FINE, max_iterations=model.problem.estimation.max_iterations)
+
+
+def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
+    """Fit from the starts at hand; where none ends at the noise floor and there is a simpler model, fit that first.
+
+    Return the ends, best first. The full model then starts from several releases of what the simpler one leaves out.
+    """
+    simple = nested_space(model.problem, model.space)
+    plain = _plain_starts(model, phases)
+    if simple is model.space:
+        return _rounds(model, plan, plain, "fit", phases)
+    exact = replace(plan, widths=RELEASED_WIDTHS)
+    if plan.conclusive and model.problem.estimation.loss == "squares":
+        direct = _rounds(model, exact, plain[1:], "direct fit", phases)
+        if _at_noise(direct[0].program, direct[0].solution):
+            return direct
+    inner = replace(model, space=simple)
+    nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
+    return _rounds(model, exact, released(model, simple, nested[0].solution.point.theta), "fit", phases)
+
+
+def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
+    return [model.space.guess, _predicted(model, phases)]
+
+
+def _predicted(model: Model, phases: Phases) -> FloatArray:
+    return prediction(model, phases).solution.point.theta
+
+
+def prediction(model: Model, phases: Phases) -> Fitted:
+    """Fit what best predicts the smoothed motion over short times."""
+    program = predictions(model, model.train, WIDTHS[0])
+    start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    return Fitted(solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")), program)
+
+
+def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, phases: Phases) -> list[Fitted]:
+    """Sharpen width and loss round by round; after each the worse half of the starts drops out, down to a few.
+
+    Return the ends, best first; the iterations of all are booked on each.
+    """
+    program = plan.builder(model, plan.widths[0], Squares())
+    points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
+    points.sort(key=lambda point: mean_error(program, point))
+    rounds = rounds_of(model, len(plan.widths))
+    iterations, ends = 0, list[Solution]()
+    for k in range(rounds):
+        program = plan.builder(model, plan.widths[min(k, len(plan.widths) - 1)], Squares())
+        program = replace(program, loss=loss_of_round(model, program, points[0], k))
+        watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
+        last = k == rounds - 1
+        ends = race(program, points, limits(model) if last else COARSE, watch, final_solver(model))
+        if plan.conclusive and _at_noise(program, ends[0]):
+            ends = ends[:1]
+        points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
+        iterations += sum(end.iterations for end in ends)
+    return [Fitted(replace(end, iterations=iterations), program) for end in ends]
+
+
+def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve) -> list[Solution]:
+    """Solve from every point and return the ends, best first."""
+    return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
+
+
+def _at_noise(program: Program, end: Solution) -> bool:
+    """Whether a fit by squares ends so close to the noise that no rival could be much better."""
+    if not isinstance(program.loss, Squares):
+        return False
+    samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
+    return end.objective <= 0.5 * samples * AT_NOISE
