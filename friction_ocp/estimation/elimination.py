@@ -33,9 +33,13 @@ class Reduced:
         return tuple(item.constant + item.by_theta @ step for item in self.recordings)
 
 
-def reduce_system(system: Linearisation, damping: float) -> Reduced:
-    """Eliminate all nodes; `damping` times its diagonal is added to the Hessian (Levenberg-Marquardt)."""
-    hessian = system.theta_theta + damping * np.diag(np.diag(system.theta_theta))
+def reduce_system(system: Linearisation, damping: float, scale: FloatArray | None = None) -> Reduced:
+    """Eliminate all nodes; `damping` times its diagonal is added to the Hessian (Levenberg-Marquardt).
+
+    For the parameters it is `damping` times `scale` (parameters,) where that is given.
+    """
+    own = np.diag(system.theta_theta) if scale is None else scale
+    hessian = system.theta_theta + damping * np.diag(own)
     gradient = system.theta_gradient.copy()
     recordings: list[Eliminated] = []
     for blocks in system.blocks:

@@ -11,9 +11,20 @@ from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
 
-SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e9
+FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-12, 1e12
+TRUSTED = 1e-2
+"""Damping up to which a small predicted decrease is taken for the end rather than for a short step."""
+UNDAMPED = 1e-9
+"""Damping of the step whose predicted decrease decides about the end: it sees directions that damping hides."""
+FLAT = 1e-6
+"""Curvature of a parameter over the largest on the way below which an end has left where the data see it."""
+LOST, BLIND = 1e-8, 1e3
+"""The same, below which a step is refused, up to that damping: the model behind the step knew of no such place. The
+iterates may still creep there, and come to rest above it but below `FLAT`."""
+VANISHED = (1000.0 * float(np.finfo(np.float64).eps)) ** 2
+"""Objective over that at the start where residuals are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -49,72 +60,117 @@ class Tolerances:
     max_iterations: int = 100
 
 
+@dataclass(frozen=True)
+class Trust:
+    """How far the quadratic model is believed: the damping and the scale of the parameters that it acts on."""
+
+    damping: float
+    scale: FloatArray
+    """(parameters,) the largest diagonal of the Hessian so far. Damping then stays strong for a parameter whose
+    influence fades, so that it does not run off where nothing depends on it. Source: More 1978."""
+
+    def after(self, ratio: float, system: Linearisation) -> Trust:
+        """Return the trust after a step that gained `ratio` times what was predicted.
+
+        Nielsen's cubic, between a tenth and twice. Source: Nielsen 1999, Damping parameter in Marquardt's method.
+        """
+        factor = 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3
+        scale = np.maximum(self.scale, np.diag(system.theta_theta))
+        return Trust(max(self.damping * max(factor, 0.1), SMALLEST_DAMPING), scale)
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    point: Point
+    system: Linearisation
+    trust: Trust
+
+
 def solve_gauss_newton(
     program: Program, start: Point, tolerances: Tolerances = Tolerances(), watch: Watch | None = None
 ) -> Solution:
     """Minimise a program from a start; the start is moved inside the bounds first."""
     point = Point(program.space.clip(start.theta), start.nodes)
     system = program.linearise(point)
-    damping, iteration, slow = 1e-3, 0, 0
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
-    while iteration < tolerances.max_iterations:
-        iteration += 1
-        accepted = _descend(program, point, system, damping, tolerances)
-        if accepted is None:
-            return _stuck(program, point, system, iteration, tolerances)
-        if accepted.system is None:
-            return Solution(point, system.objective, iteration, True, "the predicted decrease is below the tolerance")
-        gained = system.objective - accepted.system.objective
-        point, system, damping = accepted.point, accepted.system, accepted.damping
-        slow = slow + 1 if gained <= tolerances.progress * system.objective else 0
+    now = _Iterate(point, system, Trust(FIRST_DAMPING, np.diag(system.theta_theta)))
+    vanished, slow = VANISHED * system.objective, 0
+    for iteration in range(1, tolerances.max_iterations + 1):
+        following = _descend(program, now, tolerances)
+        if following is None:
+            return _stuck(program, now, iteration, tolerances, vanished)
+        if following is now:
+            return _ended(program, now, iteration, "the predicted decrease is below the tolerance")
+        gained = now.system.objective - following.system.objective
+        now = following
+        slow = slow + 1 if gained <= tolerances.progress * now.system.objective else 0
         if slow >= 3:
-            text = "three steps in a row gained next to nothing"
-            return Solution(point, system.objective, iteration, True, text, smooth=False)
+            return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
         if watch is not None:
-            watch(iteration, system.objective, point)
-    return Solution(point, system.objective, iteration, False, "iteration limit reached")
+            watch(iteration, now.system.objective, now.point)
+    return Solution(now.point, now.system.objective, tolerances.max_iterations, False, "iteration limit reached")
 
 
-@dataclass(frozen=True)
-class _Accepted:
-    point: Point
-    system: Linearisation | None
-    damping: float
+def _descend(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterate | None:
+    """Return what follows the first damped step that decreases the objective.
 
-
-def _descend(
-    program: Program, point: Point, system: Linearisation, damping: float, tolerances: Tolerances
-) -> _Accepted | None:
-    """Return the first damped step that decreases the objective; None where there is none."""
-    grow = 4.0
+    The iterate itself where hardly any decrease is predicted, None where no step decreases the objective.
+    """
+    damping, grow, system = now.trust.damping, 4.0, now.system
+    enough = max(tolerances.decrease * system.objective, tolerances.negligible)
     while damping <= LARGEST_DAMPING:
-        trial, predicted = trial_step(program.space, point, system, damping)
-        if predicted <= max(tolerances.decrease * system.objective, tolerances.negligible) and damping <= 1e-2:
-            return _Accepted(point, None, damping)
+        trial, predicted = trial_step(program.space, now.point, system, damping, now.trust.scale)
+        if predicted <= enough and damping <= TRUSTED and _remaining(program, now) <= enough:
+            return now
         after = program.linearise(trial)
         gained = system.objective - after.objective
-        if gained > 1e-4 * max(predicted, 0.0) and gained > 0:
-            ratio = gained / max(predicted, 1e-300)
-            shrink = 0.1 if ratio > 0.7 else (0.5 if ratio > 0.25 else 2.0)
-            return _Accepted(trial, after, max(damping * shrink, SMALLEST_DAMPING))
+        seen = damping > BLIND or not np.any(_faded(after, now.trust.scale, LOST))
+        if gained > 1e-4 * max(predicted, 0.0) and gained > 0 and seen:
+            trust = Trust(damping, now.trust.scale).after(gained / max(predicted, 1e-300), after)
+            return _Iterate(trial, after, trust)
         damping, grow = damping * grow, grow * 2.0
     return None
 
 
-def _stuck(program: Program, point: Point, system: Linearisation, iteration: int, tolerances: Tolerances) -> Solution:
-    _, predicted = trial_step(program.space, point, system, 1e-6)
-    relative = predicted / max(system.objective, 1e-300)
-    if relative <= tolerances.stalled or predicted <= tolerances.negligible:
-        text = "no step decreases the objective further"
-        return Solution(point, system.objective, iteration, True, text, smooth=False)
+def _remaining(program: Program, now: _Iterate) -> float:
+    """Return the decrease that the quadratic model predicts without damping."""
+    return trial_step(program.space, now.point, now.system, UNDAMPED)[1]
+
+
+def _faded(system: Linearisation, scale: FloatArray, share: float) -> BoolArray:
+    """Return of which parameters less than a share of their curvature is left."""
+    return np.diag(system.theta_theta) < share * scale
+
+
+def _ended(program: Program, now: _Iterate, iteration: int, message: str, smooth: bool = True) -> Solution:
+    """Return an end at a stationary point; no answer where it is one because a parameter lost its influence."""
+    theta, space = now.point.theta, program.space
+    faded = _faded(now.system, now.trust.scale, FLAT) & (theta > space.lower) & (theta < space.upper)
+    if not np.any(faded):
+        return Solution(now.point, now.system.objective, iteration, True, message, smooth)
+    names = ", ".join(name for name, lost in zip(space.names, faded, strict=True) if lost)
+    text = f"the iterates ran to where nothing depends on {names} any more; start elsewhere or bound it"
+    return Solution(now.point, now.system.objective, iteration, False, text)
+
+
+def _stuck(program: Program, now: _Iterate, iteration: int, tolerances: Tolerances, vanished: float) -> Solution:
+    objective, predicted = now.system.objective, _remaining(program, now)
+    relative = predicted / max(objective, 1e-300)
+    if relative <= tolerances.stalled or predicted <= tolerances.negligible or objective <= vanished:
+        return _ended(program, now, iteration, "no step decreases the objective further", smooth=False)
     text = f"no step decreases the objective, yet the model predicts {relative:.1e} of it"
-    return Solution(point, system.objective, iteration, False, text)
+    return Solution(now.point, objective, iteration, False, text)
 
 
-def trial_step(space: ParameterSpace, point: Point, system: Linearisation, damping: float) -> tuple[Point, float]:
-    """Return the damped Gauss-Newton point and the decrease that the quadratic model predicts."""
-    reduced = reduce_system(system, damping)
+def trial_step(
+    space: ParameterSpace, point: Point, system: Linearisation, damping: float, scale: FloatArray | None = None
+) -> tuple[Point, float]:
+    """Return the damped Gauss-Newton point and the decrease that the quadratic model predicts.
+
+    `scale` (parameters,) is what damping of the parameters is relative to; None takes the diagonal of the Hessian.
+    """
+    reduced = reduce_system(system, damping, scale)
     rows, margins = _constraint_rows(space, point.theta)
     step = bounded_step(
         reduced.hessian, reduced.gradient, space.lower - point.theta, space.upper - point.theta, rows, margins

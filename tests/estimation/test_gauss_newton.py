@@ -69,3 +69,31 @@ def test_breakdown_at_the_start_is_reported() -> None:
     solution = solve_gauss_newton(program, program.start)
     assert not solution.converged
     assert "breaks down" in solution.message
+
+
+def test_a_parameter_that_loses_its_influence_is_no_answer() -> None:
+    """1 + exp(-theta0) has no minimum: the iterates run until nothing depends on theta0, and that is said."""
+    program: Any = toy(lambda theta: ca.vertcat(1 + ca.exp(-theta[0]), theta[1] - 2), (0.0, 1.0))
+    solution = solve_gauss_newton(program, program.start, TIGHT)
+    assert not solution.converged
+    assert "nothing depends on theta0 any more" in solution.message
+
+
+def test_a_parameter_that_never_had_influence_does_not_spoil_the_others() -> None:
+    """What nothing depends on from the start keeps its guess."""
+    program: Any = toy(lambda theta: theta[1] - 2 + 0 * theta[0], (5.0, 1.0))
+    solution = solve_gauss_newton(program, program.start, TIGHT)
+    assert solution.converged
+    assert solution.point.theta == pytest.approx([5.0, 2.0])
+
+
+def test_residuals_of_rounding_errors_are_an_answer() -> None:
+    """Where nothing but rounding is left no step decreases the objective, whatever the model predicts."""
+    x = np.linspace(0.0, 2.0, 30)
+    exact = 0.3 * np.exp(-x) + 0.7 * np.exp(-2.5 * x)
+    program: Any = toy(
+        lambda b: b[0] * ca.exp(-b[1] * x) + b[2] * ca.exp(-b[3] * x) - ca.DM(exact), (0.4, 0.8, 0.8, 3.0)
+    )
+    solution = solve_gauss_newton(program, program.start, Tolerances(decrease=0.0, negligible=0.0, progress=0.0))
+    assert solution.converged
+    assert solution.point.theta == pytest.approx([0.3, 1.0, 0.7, 2.5], rel=1e-8)
