@@ -77,9 +77,10 @@ def magnetised(m, st, j, begin, end):
     share, width = m.amplifier[j, 2], m.amplifier[j, 3]
     if share == 0.0:
         return begin, end
-    first = st.magnet[j]
-    st.magnet[j] = min(max(first + end - begin, -width), width)
-    return begin - share * first, end - share * st.magnet[j]
+    first = min(max(st.magnet[j, 0] + begin - st.magnet[j, 1], -width), width)
+    last = min(max(first + end - begin, -width), width)
+    st.magnet[j, 0], st.magnet[j, 1] = last, end
+    return begin - share * first, end - share * last
 
 
 @njit

@@ -107,7 +107,7 @@ STATE = np.dtype(
         ("slipped", FLOAT, (JOINTS, LOOPS)),
         ("queue", FLOAT, (MOTORS, AMPLIFIER_STEPS, 2)),  # commands under way, at start and end of their step
         ("amplified", FLOAT, (MOTORS, 2)),  # behind the rate limit, behind the lag
-        ("magnet", FLOAT, (MOTORS,)),
+        ("magnet", FLOAT, (MOTORS, 2)),  # current since the last reversal within its limits, last current
     ],
     align=True,
 )

@@ -1,0 +1,111 @@
+"""Draw the cases of a seed: kinds in fixed shares, effects in turn, places at random, sizes by what noise hides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from blind.cases import EFFECTS, TRAIN, Case, Planted, case_of, read_answer, write_answer, write_case
+from blind.catalogue import CATALOGUE, Effect, Site
+from blind.machines import MACHINES
+from blind.outside import OUTSIDE
+from blind.recording import Hidden
+from blind.visibility import Excited, View, size_for
+
+BLOCK = ("none",) * 9 + ("one",) * 10 + ("two",) * 2 + ("outside",) * 3
+"""Kinds of 24 neighbouring cases, in random order: three in eight have no effect."""
+VISIBLE, GRAVE = 3.0, 60.0
+"""Noise ratios of the gap between which sizes are drawn (log-uniform)."""
+LOST, EXCESSIVE = 0.75 * VISIBLE, 2.0 * GRAVE
+"""Noise ratios beyond which a place is given up: the effect does not show there, or cannot be held small."""
+CLASHES = (
+    ("stribeck", "polyline_break", "quadratic_drag", "asymmetry", "presliding", "load_dependence"),
+    ("inertia_error", "structural_mode"),
+    ("parameter_error", "backlash", "stiffening", "transmission_hysteresis"),
+)
+"""Effects of which a part has one at most: they rewrite the same numbers of the plant."""
+KIND_STREAM, TURN_STREAM = 10_000, 20_000
+
+
+def draw(seed: int, index: int) -> Case:
+    """Draw a case."""
+    kind, position = drawn_kind(seed, index)
+    rng = np.random.default_rng([seed, index, 0])
+    if kind == "none":
+        return Case(seed, index, kind, str(rng.choice(list(MACHINES))))
+    names = list(OUTSIDE if kind == "outside" else CATALOGUE)
+    count = 2 if kind == "two" else 1
+    first = [] if kind == "two" else [cycled(names, seed, position)]
+    for machine in map(str, rng.permutation(list(MACHINES))):
+        case = _filled(Case(seed, index, kind, machine), first, count, rng)
+        if case is not None:
+            return case
+    for machine in map(str, rng.permutation(list(MACHINES))):
+        case = _filled(Case(seed, index, kind, machine), list(map(str, rng.permutation(names))), count, rng)
+        if case is not None:
+            return case
+    raise RuntimeError(f"case {index} of seed {seed}: nothing is visible in any machine")
+
+
+def drawn_kind(seed: int, index: int) -> tuple[str, int]:
+    """Return the kind of a case and how many of that kind precede it."""
+    block, at = divmod(index, len(BLOCK))
+    kinds = [str(kind) for kind in np.random.default_rng([seed, KIND_STREAM, block]).permutation(BLOCK)]
+    return kinds[at], block * BLOCK.count(kinds[at]) + kinds[:at].count(kinds[at])
+
+
+def cycled(names: Sequence[str], seed: int, position: int) -> str:
+    """Return the name at a position of a sequence that goes through all of them, in another order every time."""
+    turn, at = divmod(position, len(names))
+    return str(np.random.default_rng([seed, TURN_STREAM, turn, len(names)]).permutation(names)[at])
+
+
+def _filled(case: Case, names: Sequence[str], count: int, rng: np.random.Generator) -> Case | None:
+    """Return the case with the first `count` of the effects that are visible in its machine and go together."""
+    for name in names:
+        found = plant(case, EFFECTS[name], rng)
+        if found is not None and not any(clash(found, other) for other in case.planted):
+            case = replace(case, planted=(*case.planted, found))
+        if len(case.planted) == count:
+            return case
+    return None
+
+
+def clash(one: Planted, other: Planted) -> bool:
+    """Whether two effects rewrite the same numbers of the plant."""
+    if one.component != other.component:
+        return False
+    return one.effect == other.effect or any({one.effect, other.effect} <= set(group) for group in CLASHES)
+
+
+def plant(case: Case, effect: Effect, rng: np.random.Generator) -> Planted | None:
+    """Return the effect at a random place of the machine, its size drawn by its visibility; None where it has none."""
+    machine = case.make_machine()
+    places = list(effect.places(machine))
+    if not places:
+        return None
+    component, form = str(rng.choice(places)), int(rng.integers(2**31))
+    target = float(np.exp(rng.uniform(np.log(VISIBLE), np.log(GRAVE))))
+    scales = case.scales()
+    runs = [Excited(kind, (case.seed, case.index, TRAIN, k)) for k, kind in enumerate(case.kinds()[:3])]
+
+    def build(size: float) -> Hidden:
+        site = Site(machine, scales, Hidden(machine.plant()), component, size)
+        return effect.inject(site, np.random.default_rng(form))
+
+    size, ratio = size_for(View(machine, tuple(runs)), build, target)
+    return Planted(effect.name, component, size, form, ratio) if LOST <= ratio <= EXCESSIVE else None
+
+
+def make(seed: int, index: int, folder: Path) -> Case:
+    """Write a case and, in another folder, its answer; what exists is read back. The problem file is written last."""
+    name = Case(seed, index, "", "").name
+    if (folder / "cases" / name / "problem.yaml").exists():
+        return case_of(read_answer(folder, name))
+    case = draw(seed, index)
+    write_answer(case, folder)
+    write_case(case, folder / "cases")
+    return case
