@@ -15,11 +15,17 @@ if TYPE_CHECKING:
     from friction_ocp.recording.import_recording import import_recording
     from friction_ocp.recording.recording import Channel, Recording
     from friction_ocp.result_folder import save
+    from friction_ocp.statistics.bootstrap import bootstrap
+    from friction_ocp.statistics.compare import compare
+    from friction_ocp.statistics.execution import Execution
+    from friction_ocp.statistics.multistart import multistart
+    from friction_ocp.statistics.profile import profile
 
 _HOMES = {
     "Channel": "recording.recording",
     "Estimate": "estimation.estimate",
     "EstimationOptions": "estimation.problem",
+    "Execution": "statistics.execution",
     "Finding": "errors",
     "FrictionOcpError": "errors",
     "Interrupted": "estimation.estimate",
@@ -27,10 +33,14 @@ _HOMES = {
     "Recording": "recording.recording",
     "RecordingUse": "estimation.problem",
     "Simulation": "estimation.estimate",
+    "bootstrap": "statistics.bootstrap",
     "check": "problem_file.check",
+    "compare": "statistics.compare",
     "identify": "estimation.estimate",
     "import_recording": "recording.import_recording",
     "load_problem": "problem_file.load",
+    "multistart": "statistics.multistart",
+    "profile": "statistics.profile",
     "read_recording": "recording.hdf5",
     "save": "result_folder",
     "simulate": "estimation.estimate",
@@ -41,6 +51,7 @@ __all__ = [
     "Channel",
     "Estimate",
     "EstimationOptions",
+    "Execution",
     "Finding",
     "FrictionOcpError",
     "Interrupted",
@@ -48,10 +59,14 @@ __all__ = [
     "Recording",
     "RecordingUse",
     "Simulation",
+    "bootstrap",
     "check",
+    "compare",
     "identify",
     "import_recording",
     "load_problem",
+    "multistart",
+    "profile",
     "read_recording",
     "save",
     "simulate",

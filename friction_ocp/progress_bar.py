@@ -8,6 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 
 from friction_ocp.estimation.progress import Progress, Report
+from friction_ocp.execution.run import Tally, Watch
 
 SECONDS_BETWEEN_LINES = 2.0
 
@@ -63,6 +64,55 @@ def _plain_lines() -> Progress:
         print(
             f"{report.phase}: iteration {report.iteration}, objective {report.objective:.6g}, "
             f"{elapsed:.0f} s gone, about {left:.0f} s left",
+            file=sys.stderr,
+        )
+
+    return update
+
+
+@contextmanager
+def task_bar() -> Generator[Watch]:
+    """Yield what hears of every task that ends: a bar on a terminal, lines at most every few seconds elsewhere."""
+    if not sys.stderr.isatty():
+        yield _task_lines()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[failed]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("tasks", total=None, failed="")
+
+        def update(tally: Tally) -> None:
+            failed = f"{tally.failed} failed" if tally.failed else ""
+            bar.update(task, completed=tally.done, total=tally.total, description=tally.what, failed=failed)
+
+        yield update
+
+
+def _task_lines() -> Watch:
+    began, shown = time.monotonic(), [-SECONDS_BETWEEN_LINES]
+
+    def update(tally: Tally) -> None:
+        elapsed = time.monotonic() - began
+        if elapsed - shown[0] < SECONDS_BETWEEN_LINES and tally.done < tally.total:
+            return
+        shown[0] = elapsed
+        fresh = tally.done - tally.found
+        left = f", about {elapsed * (tally.total - tally.done) / fresh:.0f} s left" if fresh else ""
+        found = f", {tally.found} of them from an earlier run" if tally.found else ""
+        failed = f", {tally.failed} failed" if tally.failed else ""
+        print(
+            f"{tally.what}: {tally.done} of {tally.total} done{found}{failed}, {elapsed:.0f} s gone{left}",
             file=sys.stderr,
         )
 

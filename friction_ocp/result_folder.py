@@ -11,6 +11,8 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, Simulation
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
+from friction_ocp.statistics.compare import Comparison
+from friction_ocp.statistics_document import Statistic, statistic_document
 from friction_ocp.whole_file import whole_file
 
 Arrays = dict[str, dict[str, dict[str, Any]]]
@@ -22,10 +24,13 @@ def write_text(path: Path, text: str) -> None:
         staged.write_text(text, encoding="utf-8")
 
 
-def save(result: Estimate | Simulation, folder: str | Path) -> Path:
+def save(result: Estimate | Simulation | Statistic, folder: str | Path) -> Path:
     """Write everything that a command leaves behind and return the folder."""
     target = Path(folder)
-    if isinstance(result, Estimate):
+    if isinstance(result, Statistic):
+        best = result.candidates[0].estimate if isinstance(result, Comparison) else result.estimate
+        write_results(target, statistic_document(result), simulation_series(best.simulation))
+    elif isinstance(result, Estimate):
         fitted = fitted_problem(result, target)
         write_results(target, estimate_document(result), simulation_series(result.simulation), fitted)
     else:

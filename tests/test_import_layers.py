@@ -14,13 +14,15 @@ PACKAGE = Path(__file__).parents[1] / "friction_ocp"
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("errors", "whole_file"),
+    ("execution",),
     ("quantities", "parameters", "expressions", "dae"),
     ("friction",),
     ("drive",),
     ("simulation", "recording"),
     ("estimation",),
+    ("statistics",),
     ("problem_file", "plots", "result_document", "progress_bar"),
-    ("report",),
+    ("report", "statistics_document"),
     ("result_folder",),
     ("cli",),
     ("__init__", "__main__"),

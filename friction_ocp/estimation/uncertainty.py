@@ -65,7 +65,7 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
         information = found.jacobian.T @ (_density_weight(found)[:, None] * found.jacobian) + found.prior
     bound = space.at_bounds(theta)
     free = ~bound
-    told, untold = _inverse(information[np.ix_(free, free)])
+    told, untold = inverse_information(information[np.ix_(free, free)])
     covariance = np.full(information.shape, np.nan)
     if white and not absolute:
         covariance[np.ix_(free, free)] = told + untold
@@ -85,7 +85,7 @@ def _density_weight(found: Influence) -> FloatArray:
     return np.full(r.size, 2.0 * density)
 
 
-def _inverse(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def inverse_information(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the inverse of an information matrix in two parts: directions with information, and those without.
 
     The latter get a huge variance. No score varies along them, so that a sandwich would find them known.

@@ -7,13 +7,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from friction_ocp.plots.bootstrap import bootstrap_figure
+from friction_ocp.plots.comparison import comparison_figure
 from friction_ocp.plots.correlation import correlation_figure
 from friction_ocp.plots.curves import friction_figures
 from friction_ocp.plots.overview import overview_figure
+from friction_ocp.plots.profiles import profiles_figure
 from friction_ocp.plots.reading import objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.plots.style import Figure, figure_style, save
 from friction_ocp.plots.traces import traces_figure
+from friction_ocp.plots.waterfall import waterfall_figure
 from friction_ocp.plots.whiteness import whiteness_figure
 
 
@@ -30,6 +34,7 @@ def write_figures(result: Mapping[str, Any], series: Series, folder: Path) -> li
 
 def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, Figure]]:
     """Yield the name and figure of whatever the result has, one at a time to hold few in memory."""
+    yield from statistic_figures(result)
     if part(result, "parameters"):
         yield "parameters", overview_figure(objects(result, "parameters"))
     yield from (
@@ -42,6 +47,18 @@ def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, F
         yield "residual-autocorrelation", whiteness_figure(objects(result, "residuals"))
     if rows(part(result, "correlation"), "names"):
         yield "correlation", correlation_figure(part(result, "correlation"))
+
+
+def statistic_figures(result: Mapping[str, Any]) -> Iterator[tuple[str, Figure]]:
+    """Yield the figure of the statistic that a result holds, if any."""
+    if part(result, "multistart"):
+        yield "waterfall", waterfall_figure(part(result, "multistart"), objects(result, "parameters"))
+    if part(result, "profile"):
+        yield "profiles", profiles_figure(part(result, "profile"))
+    if part(result, "bootstrap"):
+        yield "bootstrap", bootstrap_figure(part(result, "bootstrap"))
+    if part(result, "compare"):
+        yield "comparison", comparison_figure(part(result, "compare"))
 
 
 def file_stem(name: str, taken: set[str]) -> str:

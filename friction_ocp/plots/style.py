@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -92,3 +93,13 @@ def save(figure: Figure, stem: Path) -> list[Path]:
         figure.set_layout_engine("none")  # laid out once, for both files
         paths.append(path)
     return paths
+
+
+def svg_text(figure: Figure) -> str:
+    """Return a figure as an SVG document, the same for equal figures."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    written = io.StringIO()
+    figure.savefig(written, format="svg", metadata={"Date": None})
+    return written.getvalue()

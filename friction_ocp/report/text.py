@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friction_ocp.report.sentence import verdict_sentence
+from friction_ocp.report.statistics import statistic_section, table_lines, whole_verdict
 
 
 def summary(result: Mapping[str, Any]) -> str:
-    """Return warnings, parameter table and free-run errors of a result document."""
+    """Return warnings, parameter table and free-run errors of a result document; of a statistic, its tables."""
     lines = [result["title"], ""]
+    statistic = statistic_section(result, with_figure=False)
     if result["parameters"]:
-        lines += [verdict_sentence(result), ""]
+        lines += [whole_verdict(result), ""]
     lines += [f"! {warning}" for warning in result["warnings"]]
     lines += [""] if result["warnings"] else []
+    if statistic is not None:
+        return "\n".join([*lines, *(line for table in statistic.tables for line in (*table_lines(table), ""))]).rstrip()
     lines += _parameter_lines(result["parameters"])
     for name, errors in result["fit"]["train"].items():
         lines.append(f"free run, training    {name}: {_error(errors)}")

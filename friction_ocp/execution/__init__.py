@@ -1,0 +1,1 @@
+"""Tasks that run side by side, and whose results outlive an interrupt."""

@@ -1,0 +1,35 @@
+"""Where tasks run: one interface, in front of this process, of others, and some day of a cluster."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Sequence
+from typing import Any
+
+from friction_ocp.execution.task import Outcome, Task, attempt
+
+
+class AbstractExecutor(ABC):
+    """Runs tasks that share one argument."""
+
+    @abstractmethod
+    def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
+        """Yield the outcome of every task as it ends, in any order; `shared` goes to each worker once.
+
+        Closing the iterator stops whatever still runs.
+        """
+
+
+class InProcess(AbstractExecutor):
+    """One task after another in this process: for tests, for a debugger, and where processes may not be started."""
+
+    def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
+        for task in tasks:
+            yield attempt(task, shared)
+
+
+def local_executor(workers: int = 2) -> AbstractExecutor:
+    """Return what runs tasks on this machine; one worker is this process."""
+    from friction_ocp.execution.processes import Processes
+
+    return Processes(workers) if workers > 1 else InProcess()

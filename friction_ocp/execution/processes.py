@@ -1,0 +1,157 @@
+"""Worker processes on this machine.
+
+Each is spawned, never forked: CasADi and compiled sweeps hold threads that a fork would leave locked. A worker that
+dies takes its own task with it and no other, which the pools of the standard library do not offer.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Any
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.execution.executor import AbstractExecutor
+from friction_ocp.execution.task import Outcome, Task, attempt
+
+ONE_THREAD = {name: "1" for name in ("FRICTION_OCP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+"""Environment of a worker: the processors are shared out among the workers already."""
+PATIENCE = 5.0
+"""Seconds that a worker has to end before it is killed."""
+
+
+@dataclass(frozen=True)
+class Processes(AbstractExecutor):
+    """A fixed number of worker processes, each with one task at a time."""
+
+    workers: int = 2
+
+    def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
+        team = _Team(pickle.dumps(shared), list(tasks))
+        try:
+            team.hire(min(self.workers, len(tasks)))
+            while team.busy:
+                yield from team.listen()
+        finally:
+            team.dismiss()
+
+
+@dataclass
+class _Worker:
+    process: SpawnProcess
+    connection: Connection
+    ready: bool = False
+    task: Task | None = None
+
+
+class _Team:
+    """Workers, what each is doing, and what is left to do."""
+
+    def __init__(self, shared: bytes, tasks: list[Task]) -> None:
+        self._shared, self._waiting = shared, tasks[::-1]
+        self._workers: list[_Worker] = []
+
+    @property
+    def busy(self) -> bool:
+        return bool(self._workers)
+
+    def hire(self, count: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        with _environment(ONE_THREAD):
+            for _ in range(count):
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_serve, args=(theirs, self._shared), daemon=True)
+                process.start()
+                theirs.close()
+                self._workers.append(_Worker(process, ours))
+
+    def listen(self) -> list[Outcome]:
+        """Wait for any worker to speak or die; hand out the next tasks and return what has ended."""
+        speaking = wait([worker.connection for worker in self._workers])
+        heard = [self._hear(worker) for worker in self._workers.copy() if worker.connection in speaking]
+        return [outcome for outcome in heard if outcome is not None]
+
+    def _hear(self, worker: _Worker) -> Outcome | None:
+        try:
+            outcome: Outcome | None = worker.connection.recv()
+        except (EOFError, OSError):
+            return self._bury(worker)
+        worker.ready, worker.task = True, None
+        if not self._waiting:
+            self._release(worker)
+        else:
+            worker.task = self._waiting.pop()
+            worker.connection.send_bytes(pickle.dumps(worker.task))
+        return outcome
+
+    def _bury(self, worker: _Worker) -> Outcome | None:
+        """Replace a worker that died; its task is lost."""
+        worker.process.join(PATIENCE)
+        code = worker.process.exitcode
+        self._release(worker)
+        if not worker.ready:
+            what = f"a worker process ended with code {code} before it could begin"
+            remedy = "a script that calls this needs `if __name__ == '__main__':`; or run with one worker"
+            raise FrictionOcpError(Finding("execution", what, remedy=remedy))
+        if self._waiting:
+            self.hire(1)
+        if worker.task is None:
+            return None
+        return Outcome(worker.task.key, error=f"its process ended with code {code}", lost=True)
+
+    def _release(self, worker: _Worker) -> None:
+        worker.connection.close()
+        self._workers.remove(worker)
+
+    def dismiss(self) -> None:
+        for worker in self._workers:
+            worker.process.terminate()
+        for worker in self._workers.copy():
+            worker.process.join(PATIENCE)
+            if worker.process.is_alive():
+                worker.process.kill()
+            self._release(worker)
+
+
+@contextmanager
+def _environment(changes: dict[str, str]) -> Generator[None]:
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _serve(connection: Connection, packed: bytes) -> None:
+    """Work on tasks until the other end closes; Ctrl-C is for the parent to answer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    shared = pickle.loads(packed)
+    connection.send(None)
+    while True:
+        try:
+            content = connection.recv_bytes()
+        except (EOFError, OSError):
+            return
+        connection.send(attempt(pickle.loads(content), shared))
+
+
+def _end_with_parent() -> None:
+    """Leave at once where the parent was killed: nobody would hear the outcome."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,51 @@
+"""A piece of work and what came of it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from friction_ocp.errors import FrictionOcpError
+
+Json = Any
+"""What a JSON file holds: None, bool, int, finite float, str, lists and dictionaries of these."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call `function(shared, *arguments)`; function and arguments can be pickled, the value is `Json`."""
+
+    key: str
+    """Names the task among those of one run, in progress lines and on disk."""
+    function: Callable[..., Json]
+    arguments: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a task: a value, or the reason why there is none."""
+
+    key: str
+    value: Json = None
+    error: str = ""
+    trace: str = ""
+    """Where the error came from, for whoever repairs it."""
+    seconds: float = 0.0
+    lost: bool = False
+    """The process that worked on it ended before the task did; another run may have more luck."""
+
+
+def attempt(task: Task, shared: Any) -> Outcome:
+    """Do a task; an error is an outcome like any other, only an interrupt gets through."""
+    began = time.perf_counter()
+    try:
+        value = task.function(shared, *task.arguments)
+    except FrictionOcpError as error:
+        return Outcome(task.key, error=str(error), seconds=time.perf_counter() - began)
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        return Outcome(task.key, error=text, trace=traceback.format_exc(), seconds=time.perf_counter() - began)
+    return Outcome(task.key, value, seconds=time.perf_counter() - began)

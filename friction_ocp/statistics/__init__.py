@@ -1,0 +1,1 @@
+"""What an identification is worth: other starts, profile likelihood, bootstrap, other models."""

@@ -1,0 +1,53 @@
+"""What the tasks of one problem share, in whatever process they run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.rounds import Fitted
+from friction_ocp.execution.content import fingerprint
+from friction_ocp.statistics.optimum import Optimum
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A problem and, once it is known, its optimum; the model is built in every process where it is first needed."""
+
+    problem: Problem
+    optimum: Optimum | None = None
+
+    @cached_property
+    def model(self) -> Model:
+        """The problem made ready to compute."""
+        model = prepare(self.problem)
+        if not model.space.names:
+            where = str(self.problem.path or self.problem.title)
+            raise FrictionOcpError(Finding(where, "nothing to fit", "a parameter with {guess: ...} is fitted"))
+        return model
+
+    @cached_property
+    def fitted(self) -> Fitted:
+        """The optimum with its program."""
+        assert self.optimum is not None
+        return self.optimum.fitted(self.model)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of all that decides a number: drive, recordings, options, optimum; not of titles, comments and paths."""
+        problem = self.problem
+        uses = [[_content(use) for use in part] for part in (problem.train, problem.validation)]
+        optimum = None if self.optimum is None else self.optimum.document()
+        return fingerprint(problem.drive, uses, problem.constraints, problem.estimation, optimum)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave behind what is built: model functions belong to their process."""
+        return {"problem": self.problem, "optimum": self.optimum}
+
+
+def _content(use: RecordingUse) -> tuple[Any, ...]:
+    return use.name, dict(use.set), dict(use.recording.channels)

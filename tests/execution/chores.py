@@ -1,0 +1,41 @@
+"""Tasks for the tests: workers import them by name."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+
+def noted(folder: Path, name: str, value: float) -> dict[str, float]:
+    """Leave a line that says that this was done, and return a value."""
+    with (folder / "done").open("a", encoding="utf-8") as file:
+        file.write(f"{name}\n")
+    return {"value": value}
+
+
+def slowly_noted(folder: Path, name: str, seconds: float) -> dict[str, float]:
+    """The same after a while."""
+    time.sleep(seconds)
+    return noted(folder, name, seconds)
+
+
+def failing(folder: Path, name: str) -> None:
+    """Leave a line and fail."""
+    noted(folder, name, 0.0)
+    raise ZeroDivisionError(f"{name} cannot be done")
+
+
+def dying(folder: Path, name: str) -> dict[str, float]:
+    """Kill the worker, but only once."""
+    first = not (folder / f"{name}-died").exists()
+    (folder / f"{name}-died").touch()
+    if first:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return noted(folder, name, 1.0)
+
+
+def environment(folder: Path, name: str) -> str | None:
+    """Return a variable of the worker's environment."""
+    return os.environ.get(name)

@@ -1,0 +1,106 @@
+"""Comparison: the right model wins, special cases are recognised, and other data are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from runs import HERE, CoulombViscous, Free, right_problem, with_law
+
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.friction.static import Coulomb, Stribeck, Viscous
+from friction_ocp.statistics.compare import Comparison, compare
+from friction_ocp.statistics.scores import scores_of
+
+TAU_C, VISCOUS = Free(0.07, 0.0, 2.0), Free(2.2e-3, 0.0, 0.03)
+RIGHT = CoulombViscous(TAU_C, VISCOUS)
+SMALL, LARGE = Coulomb(TAU_C), Stribeck(TAU_C, Free(0.12, 0.0, 2.0), Free(1.0, 0.01, 50.0), VISCOUS)
+
+
+@pytest.fixture(scope="module")
+def compared() -> Comparison:
+    """Too small, right and too large a model of the plant, judged on a third run."""
+    laws = {"coulomb": SMALL, "right": RIGHT, "stribeck": LARGE}
+    problems = [replace(with_law(law, 1, 2, validation=(3,)), title=name) for name, law in laws.items()]
+    return compare(problems, execution=HERE)
+
+
+def test_the_right_model_wins(compared: Comparison) -> None:
+    """By AICc and BIC it does; held out, the larger one may tie with it, the smaller one cannot."""
+    names = [item.name for item in compared.candidates]
+    scores = {item.name: item.scores for item in compared.candidates}
+    assert names[-1] == "coulomb"
+    assert min(scores, key=lambda name: scores[name].bic) == "right"
+    assert scores["right"].aicc < scores["coulomb"].aicc - 100
+    assert compared.ranked_by == "held_out"
+    held = [item.scores.held_out for item in compared.candidates]
+    assert held == sorted(held, reverse=True)
+
+
+def test_special_cases_are_recognised_and_tested(compared: Comparison) -> None:
+    """Each of the three is nested in the next; the recordings refuse the smaller one only."""
+    ratios = {(item.special, item.general): item for item in compared.ratios}
+    assert set(ratios) == {("coulomb", "right"), ("right", "stribeck"), ("coulomb", "stribeck")}
+    assert not any(item.stated for item in compared.ratios)
+    refused = ratios["coulomb", "right"]
+    assert (refused.added, refused.p_value) == (1, pytest.approx(0.0, abs=1e-10))
+    kept = ratios["right", "stribeck"].p_value
+    assert kept is None or kept > 1e-3
+
+
+def test_white_errors_are_all_independent(compared: Comparison) -> None:
+    """The effective size of a right model's errors is near their number, 3000."""
+    assert compared.effective_samples["position"] == pytest.approx(3000, rel=0.1)
+
+
+def test_criteria_are_those_of_the_textbook(compared: Comparison) -> None:
+    """-2 log L + 2 k n / (n - k - 1) and -2 log L + k log n, with the normal likelihood at its own spread."""
+    (right,) = (item for item in compared.candidates if item.name == "right")
+    runs = right.estimate.simulation.train
+    errors = np.concatenate([run.simulated[:, 0] - run.measured[:, 0] for run in runs])
+    errors = errors[np.isfinite(errors)]
+    scores = scores_of(right.estimate, {"position": float(errors.size)})
+    n, k, variance = errors.size, 4, float(np.mean(errors**2))
+    log_likelihood = -0.5 * n * (np.log(2 * np.pi * variance) + 1.0)
+    assert scores.log_likelihood == pytest.approx(log_likelihood)
+    assert scores.aicc == pytest.approx(-2 * log_likelihood + 2 * k * n / (n - k - 1))
+    assert scores.bic == pytest.approx(-2 * log_likelihood + k * np.log(n))
+
+
+def test_too_few_independent_samples_have_no_aicc(compared: Comparison) -> None:
+    """The correction for small samples grows without limit."""
+    assert scores_of(compared.candidates[0].estimate, {"position": 3.0}).aicc == np.inf
+
+
+def test_a_special_case_may_be_stated() -> None:
+    """Two laws without a common name are nested only if someone says so; a name that is none is refused."""
+    few = replace(with_law(Viscous(VISCOUS), 1), title="viscous")
+    many = replace(with_law(Coulomb(TAU_C), 1), title="coulomb")
+    assert compare([few, many], execution=HERE).ratios == ()
+    with pytest.raises(FrictionOcpError, match="there is no problem 'dry'; one of viscous, coulomb"):
+        compare([few, many], [("viscous", "dry")], HERE)
+
+
+def test_other_data_are_refused() -> None:
+    """Recordings, loss and number of problems: every difference in a line of its own."""
+    base = replace(right_problem(), title="a")
+    with pytest.raises(FrictionOcpError, match="1 problem given; two or more"):
+        compare([base], execution=HERE)
+    other = replace(base, title="b", train=base.train[:1], estimation=replace(base.estimation, loss="huber"))
+    with pytest.raises(FrictionOcpError) as caught:
+        compare([base, other], execution=HERE)
+    lines = [str(finding) for finding in caught.value.findings]
+    assert lines == [
+        "b: the train recordings differ from those of a: draw2; the same samples in all problems",
+        "b: the loss is huber, in a squares; the same loss in all problems",
+    ]
+
+
+def test_other_noise_is_refused() -> None:
+    """Likelihoods over different noise floors cannot be compared."""
+    base = replace(right_problem(), title="a")
+    current, position = base.drive.channels
+    drive = replace(base.drive, channels=(current, replace(position, noise_std=0.02)))
+    with pytest.raises(FrictionOcpError, match=r"b: the noise floor of position is 0\.02, in a 0\.01"):
+        compare([base, replace(base, title="b", drive=drive)], execution=HERE)
