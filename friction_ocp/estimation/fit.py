@@ -11,6 +11,7 @@ from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.progress import Phases, Progress, silent
+from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, joined, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
 from friction_ocp.simulation.grid import FloatArray
@@ -26,7 +27,8 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     has no part that is hard to start, from the best ends of a fit on relaxed segments.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
-    models = [replace(model, space=model.space.moved(start)) for start in start_points(model)]
+    starts = [within_reach(model, start) for start in start_points(model)]
+    models = [replace(model, space=model.space.moved(start)) for start in starts]
     best = min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)
     return detour(model, best, phases)
 

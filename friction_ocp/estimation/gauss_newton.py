@@ -123,12 +123,12 @@ def _descend(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterat
         trial, predicted = trial_step(program.space, now.point, system, damping, now.trust.scale)
         if predicted <= enough and damping <= TRUSTED and _remaining(program, now) <= enough:
             return now
-        after = program.linearise(trial)
-        gained = system.objective - after.objective
-        seen = damping > BLIND or not np.any(_faded(after, now.trust.scale, LOST))
-        if gained > 1e-4 * max(predicted, 0.0) and gained > 0 and seen:
-            trust = Trust(damping, now.trust.scale).after(gained / max(predicted, 1e-300), after)
-            return _Iterate(trial, after, trust)
+        gained = system.objective - program.objective(trial)
+        if gained > 1e-4 * max(predicted, 0.0) and gained > 0:
+            after = program.linearise(trial)
+            if damping > BLIND or not np.any(_faded(after, now.trust.scale, LOST)):
+                trust = Trust(damping, now.trust.scale).after(gained / max(predicted, 1e-300), after)
+                return _Iterate(trial, after, trust)
         damping, grow = damping * grow, grow * 2.0
     return None
 

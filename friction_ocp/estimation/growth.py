@@ -9,7 +9,6 @@ import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
 from friction_ocp.estimation.program import Point
@@ -20,6 +19,7 @@ from friction_ocp.estimation.rounds import (
     Fitted,
     Plan,
     final_solver,
+    is_noise,
     limits,
     prediction,
     race,
@@ -53,7 +53,7 @@ def drifting(model: Model, plan: Plan, horizon_s: float, phases: Phases) -> Fitt
     simple = nested_space(model.problem, model.space)
     if simple is not model.space:
         ends += _released_windows(model, simple, horizon_s, phases)
-    if not any(_is_noise(end) for end in ends):
+    if not any(is_noise(end.program, end.solution) for end in ends):
         rivals = _distinct(staged(model, plan, phases))[:FOLLOWED]
         ends += [_grow(model, fitted, horizon_s, GROWTH, phases).end for fitted in rivals]
     return min(ends, key=lambda fitted: fitted.solution.objective)
@@ -104,7 +104,7 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
         solution = final_solver(model)(program, start, limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     inside = not model.space.at_bounds(fitted.solution.point.theta).any()
-    return Growth(fitted, inside and _is_noise(fitted) and _joined_at_no_cost(before, fitted))
+    return Growth(fitted, inside and is_noise(fitted.program, fitted.solution) and _joined_at_no_cost(before, fitted))
 
 
 def _joined_at_no_cost(before: Fitted, after: Fitted) -> bool:
@@ -116,14 +116,6 @@ def _joined_at_no_cost(before: Fitted, after: Fitted) -> bool:
     ratio = 2.0 * (after.solution.objective - before.solution.objective)
     allowed = float(_stats.chi2.ppf(JOINING, freed * states))  # pyright: ignore[reportUnknownMemberType]
     return ratio <= allowed
-
-
-def _is_noise(fitted: Fitted) -> bool:
-    """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
-    if not isinstance(fitted.program.loss, Squares):
-        return False
-    samples = sum(int(np.isfinite(item.measured).sum()) for item in fitted.program.experiments)
-    return fitted.solution.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
 
 
 def _interval(model: Model) -> float:

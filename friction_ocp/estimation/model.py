@@ -27,6 +27,16 @@ STEP_PER_DECAY = 0.1
 
 
 @dataclass(frozen=True)
+class SpeedRange:
+    """Speeds of one shaft, on its own side."""
+
+    typical: float
+    """Root mean square, rad/s."""
+    top: float
+    """Largest magnitude, rad/s."""
+
+
+@dataclass(frozen=True)
 class Model:
     """Everything that a fit or a simulation of a problem needs."""
 
@@ -41,6 +51,8 @@ class Model:
     """(groups + 1,) typical speed of each group and 1 for the backlash corners, to scale the smoothing."""
     state_scale: FloatArray
     """(states,) typical size of each state."""
+    speeds: Mapping[str, SpeedRange]
+    """How fast each shaft turns in the training recordings, by its name."""
     max_step: float
     """Longest integrator step, s."""
 
@@ -74,6 +86,7 @@ def prepare(problem: Problem) -> Model:
         floors=floors,
         speed_scale=_speed_scale(drive, states),
         state_scale=_state_scale(states),
+        speeds=_speeds(drive, space, problem, states),
         max_step=max_step,
     )
 
@@ -111,6 +124,21 @@ def _speed_scale(drive: SteppedDrive, states: FloatArray) -> FloatArray:
         speed = float(np.sqrt(np.mean(states[:, first + k] ** 2)))
         scale[group] = speed if speed > 0 else 1.0
     return scale
+
+
+def _speeds(drive: SteppedDrive, space: ParameterSpace, problem: Problem, states: FloatArray) -> dict[str, SpeedRange]:
+    """Return the range of speeds of every shaft whose speed is a state."""
+    mech = drive.mechanism
+    numbers = space.numbers(space.guess, problem.train[0].name)
+    first, ranges = len(mech.angle_groups), dict[str, SpeedRange]()
+    for k, group in enumerate(mech.free_groups):
+        speed = np.abs(states[:, first + k])
+        names = mech.topology.members(group)
+        ratios = ca.vertcat(*[ca.SX(mech.topology.speed_ratio[name]) for name in names])
+        by_name = ca.Function("ratios", [ca.vertcat(*mech.parameters.values())], [ratios])(numbers)
+        for name, ratio in zip(names, np.abs(np.asarray(by_name)).ravel(), strict=True):
+            ranges[name] = SpeedRange(float(np.sqrt(np.mean(speed**2)) * ratio), float(np.max(speed) * ratio))
+    return ranges
 
 
 def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:

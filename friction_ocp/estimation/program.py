@@ -15,7 +15,7 @@ from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.parameter_space import ParameterSpace
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 from friction_ocp.simulation.kernel import SweepRequest, SweepResult
 from friction_ocp.simulation.sweep import Sweep
 
@@ -206,13 +206,12 @@ class Program:
         errors = np.where(seen, errors, 0.0)
         system.cost += float(np.sum(self.loss.cost(errors[seen])))
         weight = np.where(seen, self.loss.weight(errors), 0.0)
-        states = system.node_node.shape[1]
-        for j in range(cut.count):
-            stop = cut.first[j + 1] + (1 if j == cut.count - 1 else 0)
-            rows = slice(cut.first[j], stop)
-            jacobian = (result.dy[rows] / self.noise[:, None]).reshape(-1, result.dy.shape[2])
-            by_node, by_theta = jacobian[:, :states], jacobian[:, states:] @ slope
-            system.add(j, by_node, by_theta, errors[rows].ravel(), weight[rows].ravel())
+        for batch in _batches(cut.first):
+            rows, inside = _rows_of(cut.first, batch)
+            jacobian = result.dy[rows] / self.noise[:, None]
+            shape = (rows.shape[0], -1, result.dy.shape[2])
+            weights = (weight[rows] * inside[:, :, None]).reshape(shape[0], -1)
+            system.add(batch, jacobian.reshape(shape), errors[rows].reshape(shape[0], -1), weights, slope)
 
     def _add_gaps(
         self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: _System
@@ -220,17 +219,17 @@ class Program:
         if cut.gap_weight is None or cut.count < 2:
             return
         assert result.dend is not None
-        states = nodes.shape[1]
-        for j in range(cut.count - 1):
-            weight = cut.gap_weight[j]
-            gap: FloatArray = weight @ (result.end[j] - nodes[j + 1])
-            by_node, by_theta = weight @ result.dend[j][:, :states], weight @ (result.dend[j][:, states:] @ slope)
-            system.cost += 0.5 * float(gap @ gap)
-            system.add(j, by_node, by_theta, gap, np.ones(gap.size))
-            system.node_next[j] -= by_node.T @ weight
-            system.node_node[j + 1] += weight.T @ weight
-            system.node_theta[j + 1] -= weight.T @ by_theta
-            system.node_gradient[j + 1] -= weight.T @ gap
+        weight, states = cut.gap_weight, nodes.shape[1]
+        before, after = slice(0, cut.count - 1), slice(1, cut.count)
+        gap: FloatArray = np.einsum("kij,kj->ki", weight, result.end[:-1] - nodes[1:])
+        jacobian = weight @ result.dend[:-1]
+        system.cost += 0.5 * float(np.sum(gap**2))
+        system.add(before, jacobian, gap, np.ones(gap.shape), slope)
+        back = weight.transpose(0, 2, 1)
+        system.node_next -= jacobian[:, :, :states].transpose(0, 2, 1) @ weight
+        system.node_node[after] += back @ weight
+        system.node_theta[after] -= back @ (jacobian[:, :, states:] @ slope)
+        system.node_gradient[after] -= np.einsum("kij,kj->ki", back, gap)
 
     def _add_start(self, index: int, point: Point, system: _System) -> None:
         cut, item = self.segments[index], self.experiments[index]
@@ -244,7 +243,9 @@ class Program:
                 weight = np.diag(cut.start_weight[j])
                 error: FloatArray = cut.start_weight[j] * (point.nodes[index][j] - expected)
                 system.cost += 0.5 * float(error @ error)
-                system.add(int(j), weight, -weight @ slope, error, np.ones(error.size))
+                jacobian = np.hstack([weight, -weight @ slope])[None]
+                same = np.eye(slope.shape[1])
+                system.add(slice(int(j), int(j) + 1), jacobian, error[None], np.ones((1, error.size)), same)
 
 
 @dataclass
@@ -271,14 +272,21 @@ class _System:
             np.zeros(count),
         )
 
-    def add(self, j: int, by_node: FloatArray, by_theta: FloatArray, error: FloatArray, weight: FloatArray) -> None:
-        """Add rows that depend on node j and the parameters."""
-        scaled_node, scaled_theta = by_node * weight[:, None], by_theta * weight[:, None]
-        self.node_node[j] += scaled_node.T @ by_node
-        self.node_theta[j] += scaled_node.T @ by_theta
-        self.theta_theta += scaled_theta.T @ by_theta
-        self.node_gradient[j] += scaled_node.T @ error
-        self.theta_gradient += scaled_theta.T @ error
+    def add(self, batch: slice, jacobian: FloatArray, error: FloatArray, weight: FloatArray, slope: FloatArray) -> None:
+        """Add rows of a batch of segments, each depending on its node and on the parameters.
+
+        `jacobian` (segments, rows, states + k) by node and by k numbers that move with the parameters by `slope`
+        (k, parameters); `error` and `weight` (segments, rows).
+        """
+        states = self.node_node.shape[1]
+        weighted = (jacobian * weight[:, :, None]).transpose(0, 2, 1)
+        square = weighted @ jacobian
+        gradient = np.einsum("kij,kj->ki", weighted, error)
+        self.node_node[batch] += square[:, :states, :states]
+        self.node_theta[batch] += square[:, :states, states:] @ slope
+        self.node_gradient[batch] += gradient[:, :states]
+        self.theta_theta += slope.T @ square[:, states:, states:].sum(axis=0) @ slope
+        self.theta_gradient += slope.T @ gradient[:, states:].sum(axis=0)
 
     def fold_node(self, j: int, slope: FloatArray) -> None:
         """Make node j a function of the parameters with derivative `slope` (states, parameters)."""
@@ -289,6 +297,31 @@ class _System:
             self.node_theta[j + 1] += self.node_next[j].T @ slope
             self.node_next[j] = 0.0
         self.node_node[j], self.node_theta[j], self.node_gradient[j] = np.eye(slope.shape[0]), 0.0, 0.0
+
+
+def _batches(first: IntArray) -> list[slice]:
+    """Return runs of segments of so similar length that padding them to the longest at most doubles their rows."""
+
+    def split(begin: int, stop: int) -> list[slice]:
+        longest = int(np.max(np.diff(first[begin : stop + 1]))) + 1
+        if stop - begin == 1 or longest * (stop - begin) <= 2 * int(first[stop] - first[begin]) + 2:
+            return [slice(begin, stop)]
+        middle = (begin + stop) // 2
+        return split(begin, middle) + split(middle, stop)
+
+    return split(0, len(first) - 1)
+
+
+def _rows_of(first: IntArray, batch: slice) -> tuple[IntArray, BoolArray]:
+    """Return the nodes of each segment of a batch, padded to the longest, and which of them belong to it.
+
+    The node that closes a segment belongs to the next one; the last of the recording to the last segment.
+    """
+    stops = first[1:].copy()
+    stops[-1] += 1
+    begins, ends = first[:-1][batch, None], stops[batch, None]
+    rows = begins + np.arange(int(np.max(ends - begins)))
+    return np.minimum(rows, ends - 1), rows < ends
 
 
 def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:

@@ -10,6 +10,8 @@ from friction_ocp.simulation.grid import FloatArray
 
 SHARES = (0.3, 1.0)
 """Stribeck parts over the Coulomb friction from which the released parameters start."""
+HIGHEST = 0.7
+"""Highest start of a break or a Stribeck speed over the top speed."""
 RELEASES = ((0.02, 0.3), (0.04, 0.6), (0.2, 1.0), (1.0, 1.5))
 """Pairs of Stribeck speed and highest break speed, over the typical speed, from which released parameters start."""
 
@@ -21,13 +23,12 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     Stribeck parts of several sizes.
     """
     known = dict(zip(simple.names, theta, strict=True))
-    speed = float(np.max(model.speed_scale[:-1]))
     starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
     shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
     for place, highest_break in RELEASES:
         for share in shares:
             values = [
-                _released_value(model.space, name, known, (place, highest_break), share, speed, starts[0][k])
+                _released_value(model, name, known, (place, highest_break), share, starts[0][k])
                 for k, name in enumerate(model.space.names)
             ]
             starts.append(np.array(values))
@@ -35,13 +36,7 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
 
 
 def _released_value(
-    space: ParameterSpace,
-    name: str,
-    known: dict[str, float],
-    places: tuple[float, float],
-    share: float,
-    speed: float,
-    default: float,
+    model: Model, name: str, known: dict[str, float], places: tuple[float, float], share: float, default: float
 ) -> float:
     """Return a start that leaves the friction at the typical speed as the nested model has it."""
     (place, highest_break), (stem, _, last) = places, name.partition("@")[0].rpartition(".")
@@ -51,14 +46,42 @@ def _released_value(
         return share * known.get(f"{stem}.coulomb", default)
     if name in known:
         return (1.0 - share * min(1.0, place)) * known[name] if _is_coulomb(name) else known[name]
+    speed = _typical_speed(model, name)
     if ".omega_s" in name:
         return place * speed
     if stem.endswith(".breaks"):
-        breaks = sum(other.startswith(f"{stem}.") for other in space.names)
-        return highest_break * speed * (int(last) + 1) / breaks
+        return highest_break * speed * (int(last) + 1) / _breaks(model.space, stem)
     if stem.endswith(".slopes"):
         return known.get(f"{stem}.0", default)
     return default
+
+
+def within_reach(model: Model, start: FloatArray) -> FloatArray:
+    """Return a start whose breaks and Stribeck speeds lie where the recordings go.
+
+    Nothing depends on a break above all speeds of its shaft, and no fit could move it.
+    """
+    moved = start.copy()
+    for k, name in enumerate(model.space.names):
+        path = name.partition("@")[0]
+        stem, _, last = path.rpartition(".")
+        top = model.speeds[path.partition(".")[0]].top if path.partition(".")[0] in model.speeds else np.inf
+        if ".omega_s" in path:
+            moved[k] = min(start[k], HIGHEST * top)
+        elif stem.endswith(".breaks"):
+            moved[k] = min(start[k], HIGHEST * top * (int(last) + 1) / _breaks(model.space, stem))
+    return model.space.clip(moved)
+
+
+def _breaks(space: ParameterSpace, stem: str) -> int:
+    """Return how many breaks a polyline has."""
+    return len({name.partition("@")[0] for name in space.names if name.startswith(f"{stem}.")})
+
+
+def _typical_speed(model: Model, name: str) -> float:
+    shaft = name.partition(".")[0]
+    known = [item.typical for item in model.speeds.values()]
+    return model.speeds[shaft].typical if shaft in model.speeds else max(known, default=1.0)
 
 
 def _is_coulomb(name: str) -> bool:

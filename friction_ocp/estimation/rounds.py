@@ -22,8 +22,6 @@ COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
-AT_NOISE = 1.5
-"""Mean square error over the noise floor up to which a fit needs no rivals."""
 FINALISTS = 5
 """Starts that are followed to the end."""
 
@@ -82,14 +80,19 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
 
     Return the ends, best first. The full model then starts from several releases of what the simpler one leaves out.
     """
+    conclusive = plan.conclusive and model.problem.estimation.loss == "squares"
+    if conclusive:
+        at_once = _rounds(model, replace(plan, widths=plan.widths[-1:]), [model.space.guess], "direct fit", phases)
+        if _is_sound(model, at_once[0]):
+            return at_once
     simple = nested_space(model.problem, model.space)
     plain = _plain_starts(model, phases)
     if simple is model.space:
         return _rounds(model, plan, plain, "fit", phases)
     exact = replace(plan, widths=RELEASED_WIDTHS)
-    if plan.conclusive and model.problem.estimation.loss == "squares":
+    if conclusive:
         direct = _rounds(model, exact, plain[1:], "direct fit", phases)
-        if _at_noise(direct[0].program, direct[0].solution):
+        if _is_sound(model, direct[0]):
             return direct
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
@@ -127,7 +130,7 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
         watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
         last = k == rounds - 1
         ends = race(program, points, limits(model) if last else COARSE, watch, final_solver(model))
-        if plan.conclusive and _at_noise(program, ends[0]):
+        if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
         iterations += sum(end.iterations for end in ends)
@@ -139,9 +142,15 @@ def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: W
     return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
 
 
-def _at_noise(program: Program, end: Solution) -> bool:
-    """Whether a fit by squares ends so close to the noise that no rival could be much better."""
+def is_noise(program: Program, end: Solution) -> bool:
+    """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
     if not isinstance(program.loss, Squares):
         return False
     samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
-    return end.objective <= 0.5 * samples * AT_NOISE
+    return end.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
+
+
+def _is_sound(model: Model, fitted: Fitted) -> bool:
+    """Whether residuals are noise and no parameter ran into a bound."""
+    inside = not np.any(model.space.at_bounds(fitted.solution.point.theta))
+    return inside and is_noise(fitted.program, fitted.solution)

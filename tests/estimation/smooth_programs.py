@@ -56,6 +56,10 @@ class ToyProgram:
         finite = objective if np.isfinite(objective) else np.inf
         return Linearisation(finite, jacobian.T @ jacobian, (jacobian.T @ values).ravel(), ())
 
+    def objective(self, point: Point) -> float:
+        """Return the cost of a point."""
+        return self.linearise(point).objective
+
     @property
     def start(self) -> Point:
         """The guess."""
