@@ -15,10 +15,10 @@ from friction_ocp.dae import Dae, Variable
 from friction_ocp.drive.coordinates import group_angles, group_speeds
 from friction_ocp.drive.kick import through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, column, mechanism, symbol
-from friction_ocp.drive.motors import extra_rates
+from friction_ocp.drive.motors import extra_rates, lag_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
-from friction_ocp.drive.torques import applied_torques, elastic_torque
+from friction_ocp.drive.torques import applied_torques, elastic_torque, loop_rates
 from friction_ocp.drive.units import command_unit, signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -36,14 +36,21 @@ class _Symbols:
     speeds: ca.SX
     bristle: ca.SX
     extra: ca.SX
+    lagged: ca.SX
+    loops: ca.SX
     memory: ca.SX
     torques: ca.SX
     """(joints,) torques through rigid joints that friction depends on: the algebraic variables."""
 
     @property
+    def parts(self) -> tuple[ca.SX, ...]:
+        """The states by their kind."""
+        return self.angles, self.speeds, self.bristle, self.extra, self.lagged, self.loops
+
+    @property
     def x(self) -> list[ca.SX]:
         """The states."""
-        return [item for part in (self.angles, self.speeds, self.bristle, self.extra) for item in ca.vertsplit(part)]
+        return [item for part in self.parts for item in ca.vertsplit(part)]
 
 
 def dae(drive: Drive, width: float) -> Dae:
@@ -58,7 +65,8 @@ def dae(drive: Drive, width: float) -> Dae:
         raise FrictionOcpError(Finding("dae", what, "width > 0", "use the stepped drive for exact friction"))
     mech = mechanism(drive)
     symbols = _symbols(mech)
-    at = Motion(group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds), symbols.extra, symbols.memory)
+    groups = group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds)
+    at = Motion(*groups, symbols.extra, symbols.memory, symbols.lagged, symbols.loops)
     torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
@@ -76,18 +84,23 @@ def dae(drive: Drive, width: float) -> Dae:
             Variable(channel.name, signal_unit(drive, channel.measures), ca.SX(value))
             for channel, value in zip(mech.drive.outputs, outputs, strict=True)
         ),
-        ode=ca.vertcat(column([*turning, *speeding, *rates]), extra_rates(mech, at)),
+        ode=ca.vertcat(
+            column([*turning, *speeding, *rates]), extra_rates(mech, at), lag_rates(mech, at), loop_rates(mech, at)
+        ),
         alg=symbols.torques - found,
     )
 
 
 def _symbols(mech: Mechanism) -> _Symbols:
-    counts = (mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names)
+    counts = (
+        *(mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names),
+        *(mech.lagging, mech.looping),
+    )
     names = iter(mech.state_names)
-    angles, speeds, bristle, extra = (column([symbol(next(names)) for _ in part]) for part in counts)
+    angles, speeds, bristle, extra, lagged, loops = (column([symbol(next(names)) for _ in part]) for part in counts)
     memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
     joints = column([symbol(f"{joint.name}.torque") for joint in mech.loaded_joints()])
-    return _Symbols(angles, speeds, bristle, extra, memory, joints)
+    return _Symbols(angles, speeds, bristle, extra, lagged, loops, memory, joints)
 
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
@@ -124,14 +137,19 @@ def _acceleration(mech: Mechanism, group: int, torques: dict[str, Any], friction
 
 
 def _states(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
-    return tuple(Variable(item.name(), _state_unit(mech.drive, item.name()), item) for item in symbols.x)
+    return tuple(Variable(item.name(), _state_unit(mech, item.name()), item) for item in symbols.x)
 
 
-def _state_unit(drive: Drive, name: str) -> str:
-    if drive.controller is not None and name.startswith("controller."):
+def _state_unit(mech: Mechanism, name: str) -> str:
+    drive, (part, _, signal) = mech.drive, name.partition(".")
+    if drive.controller is not None and part == "controller":
         return command_unit(drive, drive.controller)
-    part, _, signal = name.partition(".")
-    return si_unit("angle", drive.shaft(part).motion) if signal.startswith("friction.z") else signal_unit(drive, name)
+    if signal == "lagged":
+        return signal_unit(drive, f"{part}.{mech.driving_signal(drive.motor(part))}")
+    if signal == "hysteresis.z":
+        part = next(item.to_shaft for item in mech.looping if item.name == part)
+    deflected = signal == "hysteresis.z" or signal.startswith("friction.z")
+    return si_unit("angle", drive.shaft(part).motion) if deflected else signal_unit(drive, name)
 
 
 def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
@@ -143,7 +161,7 @@ def _algebraic(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
 def _inputs(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
     given = [Variable(name, _input_unit(mech.drive, name), item) for name, item in mech.inputs.items()]
     held = [item for item in ca.vertsplit(symbols.memory) if item.is_symbolic()]
-    return (*given, *(Variable(HELD, _state_unit(mech.drive, HELD), item) for item in held))
+    return (*given, *(Variable(HELD, _state_unit(mech, HELD), item) for item in held))
 
 
 def _input_unit(drive: Drive, name: str) -> str:

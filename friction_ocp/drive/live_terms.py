@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Protocol, TypeVar
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
-from friction_ocp.parameters import is_off
+from friction_ocp.parameters import Value, is_off
 
 
 class _Term(Protocol):
@@ -32,6 +32,10 @@ def _live(term: Term | None) -> Term | None:
     return None if term is None or term.idle else term
 
 
+def _on(value: Value) -> Value:
+    return None if is_off(value) else value
+
+
 def _shaft(shaft: Shaft) -> Shaft:
     friction, warm_up = shaft.friction, _live(shaft.friction.warm_up)
     warm_up = None if warm_up is None else warm_up.live()
@@ -40,11 +44,23 @@ def _shaft(shaft: Shaft) -> Shaft:
 
 
 def _transmission(item: Transmission) -> Transmission:
-    return replace(item, backlash=None if is_off(item.backlash) else item.backlash)
+    return replace(
+        item,
+        backlash=_on(item.backlash),
+        stiffening=_on(item.stiffening),
+        hysteresis=_live(item.hysteresis),
+        kinematic_error=_live(item.kinematic_error),
+    )
 
 
 def _motor(motor: Motor) -> Motor:
-    return replace(motor, cogging=_live(motor.cogging), torque_ripple=_live(motor.torque_ripple))
+    return replace(
+        motor,
+        cogging=_live(motor.cogging),
+        torque_ripple=_live(motor.torque_ripple),
+        lag=_on(motor.lag),
+        saturation=_on(motor.saturation),
+    )
 
 
 def _channel(channel: Channel) -> Channel:

@@ -54,6 +54,10 @@ class Motion:
     """Continuous states: winding currents and controller integrals."""
     memory: ca.SX
     """What a sampled controller holds between ticks."""
+    lagged: ca.SX | None = None
+    """What drives the motors that lag behind their commands."""
+    loops: ca.SX | None = None
+    """Deflections of the loops of transmissions at the start of the step; None leaves loops out."""
     h: Any = None
     """Length of the step over which torques are averaged, s; None at an instant."""
     steady: ca.SX | None = None
@@ -109,19 +113,31 @@ class Mechanism:
         return tuple(names)
 
     @property
+    def lagging(self) -> tuple[Motor, ...]:
+        """Motors that follow their commands late."""
+        return tuple(motor for motor in self.drive.motors if motor.lag is not None and self.driving_signal(motor))
+
+    @property
+    def looping(self) -> tuple[Transmission, ...]:
+        """Elastic transmissions whose twist has a loop."""
+        return tuple(item for item in self.topology.elastic if item.hysteresis is not None)
+
+    @property
     def memory_names(self) -> tuple[str, ...]:
         """Names of the states of a sampled controller."""
         return () if self.drive.controller is None else memory_names(self.drive.controller)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of all states in order: angles, speeds, bristles, continuous states, controller memory."""
+        """Names of all states in order: angles, speeds, bristles, currents and integrals, lags, loops, memory."""
         roots = self.topology.roots
         return (
             *(f"{roots[g]}.theta" for g in self.angle_groups),
             *(f"{roots[g]}.omega" for g in self.free_groups),
             *self.bristle_names,
             *self.extra_names,
+            *(f"{motor.name}.lagged" for motor in self.lagging),
+            *(f"{item.name}.hysteresis.z" for item in self.looping),
             *self.memory_names,
         )
 
@@ -174,11 +190,22 @@ class Mechanism:
 
     def has_winding_state(self, motor: Motor) -> bool:
         """Whether the current of a motor is a state: driven by voltage through an inductance."""
-        if motor.inductance is None:
-            return False
+        return motor.inductance is not None and self.driving_signal(motor) == "voltage"
+
+    def driving_signal(self, motor: Motor) -> str | None:
+        """Return what drives a motor: torque, current or voltage; None where nothing does."""
+        given = {channel.measures for channel in self.drive.inputs}
         controller = self.drive.controller
-        by_input = any(channel.measures == f"{motor.name}.voltage" for channel in self.drive.inputs)
-        return by_input or (controller is not None and controller.output == "voltage")
+        ways = {
+            "torque": ("torque",),
+            "current": ("current", "current_command"),
+            "voltage": ("voltage",),
+        }
+        for signal, measured in ways.items():
+            commanded = controller is not None and controller.output == signal
+            if commanded or any(f"{motor.name}.{name}" in given for name in measured):
+                return signal
+        return None
 
 
 def mechanism(drive: Drive) -> Mechanism:

@@ -8,22 +8,30 @@ import casadi as ca
 
 from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, saturate
 from friction_ocp.drive.mechanism import Mechanism, Motion, column
-from friction_ocp.drive.parts import Motor
-from friction_ocp.friction.smoothing import where
+from friction_ocp.drive.parts import Controller, Motor
+from friction_ocp.friction.smoothing import sqrt, where
 
 
 def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque that current makes in a motor, 0 while it is not enabled; cogging is apart from it."""
-    torque = mech.true_input(f"{motor.name}.torque")
-    torque = _commanded(mech, motor, "torque", motion) if torque is None else motor.share * torque
-    if torque is not None:
-        torque = _enabled(mech, motor, torque)
-    else:
-        current = motor_current(mech, motor, motion)
-        torque = 0.0 if current is None else motor.torque_constant * current
+    if mech.driving_signal(motor) == "torque":
+        torque = _enabled(mech, motor, _driving(mech, motor, motion))
+        return _saturated(motor, torque, torque / motor.torque_constant) * _ripple(mech, motor, motion)
+    current = motor_current(mech, motor, motion)
+    if current is None:
+        return 0.0
+    return _saturated(motor, motor.torque_constant * current, current) * _ripple(mech, motor, motion)
+
+
+def _saturated(motor: Motor, torque: Any, current: Any) -> Any:
+    return torque if motor.saturation is None else torque / sqrt(1.0 + motor.saturation * current**2)
+
+
+def _ripple(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+    """Return the factor on torque and back-EMF at the angle of the motor."""
     if motor.torque_ripple is None:
-        return torque
-    return torque * (1.0 + motor.torque_ripple.value(*mech.angle_passed(motor.shaft, motion)))
+        return 1.0
+    return 1.0 + motor.torque_ripple.value(*mech.angle_passed(motor.shaft, motion))
 
 
 def cogging_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -37,48 +45,77 @@ def _enabled(mech: Mechanism, motor: Motor, value: Any) -> Any:
 
 
 def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
-    """Return the winding current, 0 while the motor is not enabled; None for a motor driven by torque."""
-    current = _current(mech, motor, motion)
-    return None if current is None else _enabled(mech, motor, current)
-
-
-def _current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
+    """Return the winding current, 0 while the motor is not enabled; None for a motor not driven electrically."""
+    signal = mech.driving_signal(motor)
     if mech.has_winding_state(motor):
-        return motion.extra[mech.extra_names.index(f"{motor.name}.current")]
-    for signal in ("current", "current_command"):
-        current = mech.true_input(f"{motor.name}.{signal}")
-        if current is not None:
-            return motor.share * current
-    commanded = _commanded(mech, motor, "current", motion)
-    if commanded is not None:
-        return commanded
-    voltage = motor_voltage(mech, motor, motion)
-    if voltage is None:
+        current = motion.extra[mech.extra_names.index(f"{motor.name}.current")]
+    elif signal == "current":
+        current = _driving(mech, motor, motion)
+    elif signal == "voltage":
+        current = (_driving(mech, motor, motion) - _back_emf(mech, motor, motion)) / motor.resistance
+    else:
         return None
-    return (voltage - motor.torque_constant * mech.shaft_speed(motor.shaft, motion.v)) / motor.resistance
+    return _enabled(mech, motor, current)
+
+
+def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+    speed = mech.shaft_speed(motor.shaft, motion.v)
+    return motor.torque_constant * _ripple(mech, motor, motion) * speed
 
 
 def motor_voltage(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
-    """Return the terminal voltage; a duty controller scales the supply voltage."""
-    voltage = mech.true_input(f"{motor.name}.voltage")
-    if voltage is not None:
-        return motor.share * voltage
-    commanded = _commanded(mech, motor, "voltage", motion)
-    controller = mech.drive.controller
-    if commanded is None or controller is None or controller.type != "duty":
-        return commanded
-    supply = mech.true_input(f"{motor.name}.supply_voltage")
-    return commanded if supply is None else commanded * supply
+    """Return the terminal voltage of a motor that is driven by it; a duty controller scales the supply voltage."""
+    return _driving(mech, motor, motion) if mech.driving_signal(motor) == "voltage" else None
 
 
-def _commanded(mech: Mechanism, motor: Motor, output: str, motion: Motion) -> Any | None:
+def _driving(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+    """Return the torque, current or voltage that drives a motor, behind its lag."""
+    if motor.lag is None:
+        return motor_command(mech, motor, motion)
+    assert motion.lagged is not None
+    return motion.lagged[[item.name for item in mech.lagging].index(motor.name)]
+
+
+def motor_command(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+    """Return the torque, current or voltage that a motor is to follow."""
+    signal = mech.driving_signal(motor)
+    for name in (signal, "current_command") if signal == "current" else (signal,):
+        given = mech.true_input(f"{motor.name}.{name}")
+        if given is not None:
+            return motor.share * given
     controller = mech.drive.controller
-    if controller is None or controller.output != output:
-        return None
+    assert controller is not None
+    wanted = motor.share * _controlled(mech, controller, motion)
+    supply = mech.true_input(f"{motor.name}.supply_voltage") if controller.type == "duty" else None
+    return wanted if supply is None else wanted * supply
+
+
+def _controlled(mech: Mechanism, controller: Controller, motion: Motion) -> Any:
     if controller.sample_time is not None:
-        return motor.share * motion.memory[mech.memory_names.index("controller.held")]
+        return motion.memory[mech.memory_names.index("controller.held")]
     integral = motion.extra[mech.extra_names.index("controller.integral")] if has_integral(controller) else 0.0
-    return motor.share * saturate(controller, command(controller, seen_by_controller(mech, motion), integral))
+    return saturate(controller, command(controller, seen_by_controller(mech, motion), integral))
+
+
+def commands(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return what the motors that lag are to follow."""
+    return column([motor_command(mech, motor, motion) for motor in mech.lagging])
+
+
+def follows_smooth_command(mech: Mechanism, motor: Motor) -> bool:
+    """Whether the command of a motor changes within a step: recorded and joined by lines, or of a continuous loop."""
+    names = [f"{motor.name}.{signal}" for signal in ("torque", "current", "current_command", "voltage")]
+    given = [channel for channel in mech.drive.inputs if channel.measures in names]
+    if given:
+        return any(channel.hold == "linear" for channel in given)
+    return mech.drive.controller is not None and mech.drive.controller.sample_time is None
+
+
+def lag_rates(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return the time derivatives of what drives the motors that lag; lags are positive here."""
+    if motion.lagged is None or not mech.lagging:
+        return ca.SX(0, 1)
+    return (commands(mech, motion) - motion.lagged) / column([motor.lag for motor in mech.lagging])
 
 
 def seen_by_controller(mech: Mechanism, motion: Motion) -> ControlSignals:
@@ -103,8 +140,7 @@ def extra_rates(mech: Mechanism, motion: Motion) -> ca.SX:
     for motor in mech.drive.motors:
         if mech.has_winding_state(motor):
             current = motion.extra[mech.extra_names.index(f"{motor.name}.current")]
-            emf = motor.torque_constant * mech.shaft_speed(motor.shaft, motion.v)
-            driving = _enabled(mech, motor, motor_voltage(mech, motor, motion) - emf)
+            driving = _enabled(mech, motor, _driving(mech, motor, motion) - _back_emf(mech, motor, motion))
             rates.append((driving - motor.resistance * current) / motor.inductance)
     if "controller.integral" in mech.extra_names:
         controller = mech.drive.controller

@@ -106,8 +106,38 @@ class Shaft:
 
 
 @dataclass(frozen=True)
+class Hysteresis:
+    r"""A bristle between two shafts, beside the spring: the twist has a loop.
+
+    .. math:: \dot z = r - |r| z / \text{twist}, \qquad \tau = \text{torque} \cdot z / \text{twist}
+
+    r is the rate of the twist. Source: Dahl 1968, with exponent 1.
+    """
+
+    torque: Value = quantity("torque", "torque of the loop")
+    twist: Value = quantity("angle", "twist over which the loop turns", nested="guess")
+
+    @property
+    def idle(self) -> bool:
+        """Whether its torque is plainly zero."""
+        return is_off(self.torque)
+
+
+@dataclass(frozen=True)
+class KinematicError(Wave):
+    """Angle by which the output side is ahead of the ratio, periodic in the angle of the input shaft."""
+
+    cosine: Value = quantity("angle", "cosine part of the kinematic error")
+    sine: Value = quantity("angle", "sine part of the kinematic error")
+    period: Value = quantity("input_angle", "period of the kinematic error over the input angle", nested="guess")
+
+
+@dataclass(frozen=True)
 class Transmission:
-    """A reducer, coupling or screw between two shafts; `stiffness` None joins them rigidly."""
+    """A reducer, coupling or screw between two shafts; `stiffness` None joins them rigidly.
+
+    Twisted by w beyond its play it carries stiffness w + stiffening w^3.
+    """
 
     from_shaft: str
     to_shaft: str
@@ -115,6 +145,9 @@ class Transmission:
     stiffness: Value = quantity("stiffness", "stiffness", None)
     damping: Value = quantity("viscous", "damping", 0.0)
     backlash: Value = quantity("angle", "free play", 0.0)
+    stiffening: Value = quantity("cubic_stiffness", "cubic stiffness", 0.0)
+    hysteresis: Hysteresis | None = None
+    kinematic_error: KinematicError | None = None
 
     @property
     def name(self) -> str:
@@ -129,7 +162,12 @@ class Transmission:
 
 @dataclass(frozen=True)
 class Motor:
-    """An electric motor on a shaft; its back-EMF constant equals its torque constant."""
+    """An electric motor on a shaft; its back-EMF constant equals its torque constant.
+
+    What drives it (current, torque or voltage) follows its command with the time constant `lag`; of the torque that a
+    current i would make, sqrt(1 + saturation i^2) makes the share that is left, i being the torque over the torque
+    constant where torque drives it.
+    """
 
     name: str
     shaft: str
@@ -139,6 +177,8 @@ class Motor:
     share: Value = quantity("dimensionless", "share of the command", 1.0)
     cogging: Cogging | None = None
     torque_ripple: TorqueRipple | None = None
+    lag: Value = quantity("time", "time constant with which the motor follows its command", 0.0)
+    saturation: Value = quantity("saturation", "1 / I^2 of the current I at which the torque has fallen to 71 %", 0.0)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import casadi as ca
 
 from friction_ocp.drive.coordinates import pick, prescribed_motion
 from friction_ocp.drive.mechanism import Mechanism, Motion, column
-from friction_ocp.drive.motors import seen_by_controller
+from friction_ocp.drive.motors import commands, seen_by_controller
 from friction_ocp.drive.parts import Channel
 
 
@@ -22,7 +22,13 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
     ]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
     return ca.vertcat(
-        pick(q, mech.angle_groups), pick(v, mech.free_groups), column(deflections), at.extra, column(memory)
+        pick(q, mech.angle_groups),
+        pick(v, mech.free_groups),
+        column(deflections),
+        at.extra,
+        commands(mech, at),
+        ca.SX.zeros(len(mech.looping)),
+        column(memory),
     )
 
 

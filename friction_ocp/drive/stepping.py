@@ -7,7 +7,7 @@ drift again. Order 2 on smooth motion.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -16,12 +16,26 @@ from friction_ocp.drive.control import apply_tick, compute_tick
 from friction_ocp.drive.coordinates import group_angles, group_speeds, pick
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
-from friction_ocp.drive.motors import cut, extra_rates, motor_current, motor_torque, motor_voltage, seen_by_controller
+from friction_ocp.drive.motors import (
+    commands,
+    cut,
+    extra_rates,
+    follows_smooth_command,
+    motor_current,
+    motor_torque,
+    motor_voltage,
+    seen_by_controller,
+)
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.drive.start import start_state
+from friction_ocp.drive.torques import loops_after
+from friction_ocp.friction.smoothing import expm1, tanh, where
 
 INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
+
+NO_LAG = 1.0 / 40.0
+"""Share of a step below which a lag has decayed within it to less than the rounding of doubles."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +74,13 @@ class _State:
     speeds: ca.SX
     bristle: ca.SX
     extra: ca.SX
+    lagged: ca.SX
+    loops: ca.SX
     memory: ca.SX
+
+    def at(self, q: ca.SX, v: ca.SX) -> Motion:
+        """Return the motion at an instant, the groups being at `q` with speeds `v`."""
+        return Motion(q, v, self.extra, self.memory, self.lagged, self.loops)
 
 
 def _state(mech: Mechanism) -> _State:
@@ -69,6 +89,8 @@ def _state(mech: Mechanism) -> _State:
         len(mech.free_groups),
         len(mech.bristle_names),
         len(mech.extra_names),
+        len(mech.lagging),
+        len(mech.looping),
         len(mech.memory_names),
     )
     parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]
@@ -77,7 +99,9 @@ def _state(mech: Mechanism) -> _State:
 
 def _passes(mech: Mechanism) -> int:
     """One pass suffices where nothing but the own speed couples into the speed update."""
-    coupled = bool(mech.topology.elastic) or bool(mech.bristles) or bool(mech.extra_names)
+    controller = mech.drive.controller
+    loop = bool(mech.lagging) and controller is not None and controller.sample_time is None
+    coupled = bool(mech.topology.elastic) or bool(mech.bristles) or bool(mech.extra_names) or loop
     return 2 if coupled else 1
 
 
@@ -105,27 +129,46 @@ class _Expression:
 def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     v0 = group_speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * pick(v0, mech.angle_groups)
-    mean = v0
     bristle = mech.deflections(state.bristle)
-    extra, v1, load = state.extra, v0, dict[str, Any]()
-    at = Motion(group_angles(mech, free_angles), mean, extra, state.memory, h, mean)
+    v1, load = v0, dict[str, Any]()
+    at: Motion = replace(state.at(group_angles(mech, free_angles), v0), h=h, steady=v0)
+    lagged_mean, lagged_after = _advance_lags(mech, state, at)
+    extra_after, at = state.extra, replace(at, lagged=lagged_mean)
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
         # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
         # to fourth order in its frequencies (Takahashi & Imada 1984)
         middle = group_angles(mech, free_angles + h / 12.0 * pick(v1 - v0, mech.angle_groups))
-        at = Motion(middle, mean, extra, state.memory, h, mean)
+        at = replace(at, q=middle)
         done = implicit_kick(mech, Step(h, v0, at, bristle, width))
         v1, load = done.v, done.load
         unknowns += [] if done.unknown is None else [done.unknown]
-        mean = done.mean
-        at = Motion(middle, mean, state.extra, state.memory, h, mean)
-        extra = 0.5 * (state.extra + _advance_extra(mech, state, at, h))
-    after = 2.0 * extra - state.extra
-    angles = state.angles + h * pick(mean, mech.angle_groups)
-    deflections = _advance_bristles(mech, state, at, load)
-    value = ca.vertcat(angles, pick(v1, mech.free_groups), deflections, after, state.memory)
+        at = replace(at, v=done.mean, steady=done.mean)
+        extra_after = _advance_extra(mech, state, replace(at, extra=state.extra), h)
+        lagged_mean, lagged_after = _advance_lags(mech, state, at)
+        at = replace(at, extra=0.5 * (state.extra + extra_after), lagged=lagged_mean)
+    value = ca.vertcat(
+        state.angles + h * pick(at.v, mech.angle_groups),
+        pick(v1, mech.free_groups),
+        _advance_bristles(mech, state, at, load),
+        extra_after,
+        lagged_after,
+        loops_after(mech, at),
+        state.memory,
+    )
     return _Expression(value, tuple(unknowns))
+
+
+def _advance_lags(mech: Mechanism, state: _State, at: Motion) -> tuple[ca.SX, ca.SX]:
+    """Return mean and end of what follows commands late, exact under a command that is constant over the step."""
+    if not mech.lagging:
+        return state.lagged, state.lagged
+    wanted = commands(mech, at)
+    share = column([motor.lag for motor in mech.lagging]) / at.h
+    slow = share > NO_LAG
+    gone = -expm1(-1.0 / where(slow, share, 1.0))
+    behind = state.lagged - wanted
+    return wanted + where(slow, share * gone, share) * behind, wanted + where(slow, 1.0 - gone, 0.0) * behind
 
 
 def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.SX:
@@ -150,12 +193,30 @@ def _advance_bristles(mech: Mechanism, state: _State, at: Motion, load: dict[str
 
 def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
     q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
-    at = Motion(q, v, state.extra, state.memory)
+    at = _observed_lags(mech, state.at(q, v), h)
     bristle = mech.deflections(state.bristle)
     instant = INSTANT * h
     done = implicit_kick(mech, Step(instant, v, at, bristle, width))
     value = column([recorded(mech, channel, at, (done.v - v) / instant) for channel in mech.drive.outputs])
     return _Expression(value, () if done.unknown is None else (done.unknown,))
+
+
+def _observed_lags(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
+    """Return the motion at a node with lags as they are there.
+
+    Commands are constant over a step, at their values in its middle, so that what follows a ramp comes out
+    h / 2 coth(h / (2 lag)) behind it at the nodes instead of the lag. Commands that are held are exact as they are.
+    """
+    smooth: list[Any] = [float(follows_smooth_command(mech, motor)) for motor in mech.lagging]
+    if not any(smooth):
+        return at
+    assert at.lagged is not None
+    wanted = commands(mech, at)
+    share = column([motor.lag for motor in mech.lagging]) / h
+    slow = share > NO_LAG
+    seen = 2.0 * share * where(slow, tanh(0.5 / where(slow, share, 1.0)), 1.0)
+    behind = where(column(smooth) > 0, seen, 1.0)
+    return replace(at, lagged=wanted + behind * (at.lagged - wanted))
 
 
 def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
@@ -185,11 +246,12 @@ def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) 
 def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
     controller = mech.drive.controller
     assert controller is not None
-    at = Motion(group_angles(mech, state.angles), group_speeds(mech, state.speeds), state.extra, state.memory)
+    at = state.at(group_angles(mech, state.angles), group_speeds(mech, state.speeds))
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
     computed, applied = compute_tick(controller, seen_by_controller(mech, at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
-    return ca.vertcat(state.angles, state.speeds, state.bristle, state.extra, column(chosen))
+    kept = (state.angles, state.speeds, state.bristle, state.extra, state.lagged, state.loops)
+    return ca.vertcat(*kept, column(chosen))
 
 
 def stepped(drive: Drive) -> SteppedDrive:

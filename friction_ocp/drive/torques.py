@@ -6,10 +6,10 @@ from typing import Any
 
 import casadi as ca
 
-from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, symbol
+from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, column, symbol
 from friction_ocp.drive.motors import cogging_torque, motor_torque
 from friction_ocp.drive.parts import Shaft, Transmission
-from friction_ocp.friction.smoothing import soft_threshold, where
+from friction_ocp.friction.smoothing import decay_means, smooth_abs, soft_threshold, where
 
 
 def applied_torques(mech: Mechanism, motion: Motion, corner: Any) -> dict[str, Any]:
@@ -18,7 +18,7 @@ def applied_torques(mech: Mechanism, motion: Motion, corner: Any) -> dict[str, A
     for item in mech.topology.elastic:
         exerted = elastic_torque(mech, item, motion, corner)
         torques[item.to_shaft] = torques[item.to_shaft] + exerted
-        torques[item.from_shaft] = torques[item.from_shaft] - exerted / item.ratio
+        torques[item.from_shaft] = torques[item.from_shaft] - exerted * transfer(mech, item, motion)
     for motor in mech.drive.motors:
         made = motor_torque(mech, motor, motion) + cogging_torque(mech, motor, motion)
         torques[motor.shaft] = torques[motor.shaft] + made
@@ -41,16 +41,77 @@ def elastic_torque(mech: Mechanism, item: Transmission, motion: Motion, corner: 
     """Return the torque that an elastic transmission exerts on its output shaft.
 
     Backlash is a dead zone of the twist whose corners are rounded by `corner` times the free play; the
-    damper acts while the flanks touch.
+    damper acts while the flanks touch, the loop always.
     """
     twist = mech.shaft_angle(item.from_shaft, motion) / item.ratio - mech.shaft_angle(item.to_shaft, motion)
-    rate = mech.shaft_speed(item.from_shaft, motion.v) / item.ratio - mech.shaft_speed(item.to_shaft, motion.v)
+    if item.kinematic_error is not None:
+        twist = twist + item.kinematic_error.value(*mech.angle_passed(item.from_shaft, motion))
+    rate = twist_rate(mech, item, motion, motion.v)
+    return _spring_torque(item, twist, rate, corner) + _loop_torque(mech, item, motion, rate)
+
+
+def transfer(mech: Mechanism, item: Transmission, motion: Motion) -> Any:
+    """Return the turn of the output over that of the input: 1 / ratio, and how the kinematic error changes it."""
+    if item.kinematic_error is None:
+        return 1.0 / item.ratio
+    return 1.0 / item.ratio + item.kinematic_error.slope(*mech.angle_passed(item.from_shaft, motion))
+
+
+def twist_rate(mech: Mechanism, item: Transmission, motion: Motion, v: ca.SX) -> Any:
+    """Return the rate of the twist at group speeds `v`."""
+    return transfer(mech, item, motion) * mech.shaft_speed(item.from_shaft, v) - mech.shaft_speed(item.to_shaft, v)
+
+
+def _spring_torque(item: Transmission, twist: Any, rate: Any, corner: Any) -> Any:
     if item.backlash is None:
-        return item.stiffness * twist + item.damping * rate
+        return _wound_torque(item, twist) + item.damping * rate
     half = 0.5 * item.backlash
     inside = symbol("twist")
     wound = soft_threshold(inside, half, half, corner * half)
     contact = ca.substitute(ca.jacobian(wound, inside), inside, twist)
     wound = ca.substitute(wound, inside, twist)
-    torque = item.stiffness * wound + item.damping * rate * contact
+    torque = _wound_torque(item, wound) + item.damping * rate * contact
     return where(wound >= 0, ca.fmax(torque, 0.0), ca.fmin(torque, 0.0))
+
+
+def _wound_torque(item: Transmission, wound: Any) -> Any:
+    torque = item.stiffness * wound
+    return torque if item.stiffening is None else torque + item.stiffening * wound**3
+
+
+def _loop_torque(mech: Mechanism, item: Transmission, motion: Motion, rate: Any) -> Any:
+    """Return the torque of a loop, its mean over a step at constant rate where there is a step."""
+    if item.hysteresis is None or motion.loops is None:
+        return 0.0
+    deflection = motion.loops[[one.name for one in mech.looping].index(item.name)]
+    if motion.steady is not None:
+        kept, added = decay_means(motion.h * forgetting_rate(mech, item, motion, motion.steady))
+        deflection = kept * deflection + motion.h * added * rate
+    return item.hysteresis.torque * deflection / item.hysteresis.twist
+
+
+def forgetting_rate(mech: Mechanism, item: Transmission, motion: Motion, v: ca.SX) -> Any:
+    """Return the rate at which the loop of a transmission forgets its deflection, at group speeds `v`."""
+    assert item.hysteresis is not None
+    return smooth_abs(twist_rate(mech, item, motion, v)) / item.hysteresis.twist
+
+
+def loop_rates(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return the time derivatives of the deflections of loops."""
+    rates: list[Any] = []
+    for k, item in enumerate(mech.looping):
+        assert motion.loops is not None
+        forgotten = forgetting_rate(mech, item, motion, motion.v) * motion.loops[k]
+        rates.append(twist_rate(mech, item, motion, motion.v) - forgotten)
+    return column(rates)
+
+
+def loops_after(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return the deflections of loops after a step at its mean speeds, which `motion` has."""
+    rates = ca.vertsplit(loop_rates(mech, motion))
+    after: list[Any] = []
+    for k, item in enumerate(mech.looping):
+        assert motion.loops is not None
+        kept, _ = decay_means(motion.h * forgetting_rate(mech, item, motion, motion.v))
+        after.append(motion.loops[k] + motion.h * kept * rates[k])
+    return column(after)

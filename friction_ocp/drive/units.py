@@ -23,7 +23,7 @@ MOTOR_SIGNALS = {
 REFERENCE_SIGNALS = {"theta": "angle", "omega": "speed"}
 
 _KINDS = {"viscous": "damping", "quadratic": "quadratic_damping"}
-_FIXED = {"per_kelvin": "1/K"}
+_FIXED = {"per_kelvin": "1/K", "saturation": "1/A^2"}
 """Units of what is not a quantity that can be recorded."""
 _LOAD_VISCOUS: dict[Motion, str] = {"rotary": "s/rad", "linear": "s/m"}
 
@@ -39,6 +39,8 @@ def unit_of(leaf: Leaf, drive: Drive) -> str:
             return signal_unit(drive, next(item.measures for item in drive.channels if item.name == part))
         case "load_viscous":
             return _LOAD_VISCOUS[motion]
+        case "input_angle":
+            return _input_angle_unit(drive, leaf.path.partition(".")[0])
         case "dimensionless" if key == "ratio":
             return _ratio_unit(drive, part)
         case kind if kind in _FIXED:
@@ -71,6 +73,11 @@ def feedback_motion(drive: Drive) -> Motion:
         if shaft.name in parts:
             return shaft.motion
     return drive.shafts[0].motion
+
+
+def _input_angle_unit(drive: Drive, transmission: str) -> str:
+    item = next(item for item in drive.transmissions if item.name == transmission)
+    return si_unit("angle", drive.shaft(item.from_shaft).motion)
 
 
 def _ratio_unit(drive: Drive, transmission: str) -> str:

@@ -168,10 +168,15 @@ def _typical(use: RecordingUse, name: str) -> float:
 
 
 def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> ComplexArray:
-    """Return the eigenvalues, 1/s, of the motion about standstill without dry friction."""
+    """Return the eigenvalues, 1/s, of the motion about standstill without dry friction.
+
+    What follows a command late is left out: the step is exact in it, however short its time constant.
+    """
     tiny, states = 1e-6, len(drive.state_names)
     x = ca.SX.sym("x", states)
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
     after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
     slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])
-    return np.linalg.eigvals((np.asarray(slope(np.zeros(states))) - np.eye(states)) / tiny).astype(complex)
+    rates = (np.asarray(slope(np.zeros(states))) - np.eye(states)) / tiny
+    kept = [k for k, name in enumerate(drive.state_names) if not name.endswith(".lagged")]
+    return np.linalg.eigvals(rates[np.ix_(kept, kept)]).astype(complex)

@@ -46,6 +46,11 @@ def expm1(value: Any) -> Any:
     return ca.expm1(value) if isinstance(value, ca.SX) else np.expm1(value)
 
 
+def tanh(value: Any) -> Any:
+    """Hyperbolic tangent."""
+    return ca.tanh(value) if isinstance(value, ca.SX) else np.tanh(value)
+
+
 def smooth_abs(value: Any, width: Any = 0.0) -> Any:
     """|value|, rounded below `width`, with a finite derivative at zero."""
     return sqrt(value * value + width * width + TINY)

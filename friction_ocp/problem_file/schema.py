@@ -13,8 +13,6 @@ from friction_ocp.drive.parts import (
     Controller,
     ControllerType,
     Drive,
-    ExternalTorque,
-    Gravity,
     Hold,
     Motion,
     Motor,
@@ -23,7 +21,6 @@ from friction_ocp.drive.parts import (
     Transmission,
 )
 from friction_ocp.estimation.problem import EstimationOptions, Fit, InitialState, Loss, Solver
-from friction_ocp.friction.element import FrictionElement
 from friction_ocp.parameters import Value
 from friction_ocp.problem_file.friction_section import read_friction
 from friction_ocp.problem_file.numbers import Finite, NotNegative, Number, Positive, read_number
@@ -39,43 +36,34 @@ from friction_ocp.problem_file.sections import (
     refuse,
     shown,
 )
-from friction_ocp.problem_file.term_sections import CoggingTerm, DisturbanceTerm, EccentricityTerm, TorqueRippleTerm
+from friction_ocp.problem_file.term_sections import (
+    CoggingTerm,
+    DisturbanceTerm,
+    EccentricityTerm,
+    ExternalTorqueTerm,
+    GravityTerm,
+    HysteresisTerm,
+    KinematicErrorTerm,
+    TorqueRippleTerm,
+)
 
 FORMAT = "friction-ocp-problem/1"
 INPUT_ONLY = ("supply_voltage", "enable", "current_command")
 """Signals of a motor that are given to the drive, never predicted by it."""
 
 
-class GravitySection(Section):
-    torque: Number
-    phase: Number = 0.0
-
-
-class ExternalTorqueSection(Section):
-    constant: Number
-
-
 class ShaftSection(Section):
     name: PartName
     inertia: Number
     friction: Annotated[Any, PlainValidator(read_friction)] = None
-    gravity: GravitySection | None = None
-    external_torque: ExternalTorqueSection | None = None
+    gravity: GravityTerm = None
+    external_torque: ExternalTorqueTerm = None
     motion: Motion = "rotary"
     disturbance: DisturbanceTerm = None
 
     def build(self) -> Shaft:
-        friction: dict[str, FrictionElement] = {} if self.friction is None else {"friction": self.friction}
-        gravity, torque = self.gravity, self.external_torque
-        return Shaft(
-            name=self.name,
-            inertia=self.inertia,
-            gravity=None if gravity is None else Gravity(gravity.torque, gravity.phase),
-            external_torque=None if torque is None else ExternalTorque(torque.constant),
-            motion=self.motion,
-            disturbance=self.disturbance,
-            **friction,
-        )
+        stated = given(self, *(key for key in self.keys() if key not in ("name", "inertia")))
+        return Shaft(self.name, self.inertia, **stated)
 
 
 def _read_stiffness(value: Any) -> Value:
@@ -93,10 +81,13 @@ class TransmissionSection(Section):
     stiffness: Annotated[Any, PlainValidator(_read_stiffness), NumberMark()]
     damping: Number = 0.0
     backlash: Number = 0.0
+    stiffening: Number = 0.0
+    hysteresis: HysteresisTerm = None
+    kinematic_error: KinematicErrorTerm = None
 
     def build(self, between: tuple[str, str]) -> Transmission:
-        start, end = self.from_shaft or between[0], self.to_shaft or between[1]
-        return Transmission(start, end, self.ratio, self.stiffness, self.damping, self.backlash)
+        stated = given(self, *(name for name in type(self).model_fields if name not in ("from_shaft", "to_shaft")))
+        return Transmission(self.from_shaft or between[0], self.to_shaft or between[1], **stated)
 
 
 class MotorSection(Section):
@@ -108,6 +99,8 @@ class MotorSection(Section):
     share: Number = 1.0
     cogging: CoggingTerm = None
     torque_ripple: TorqueRippleTerm = None
+    lag: Number = 0.0
+    saturation: Number = 0.0
 
     def build(self, first_shaft: str) -> Motor:
         stated = given(self, *(key for key in self.keys() if key not in ("name", "shaft")))

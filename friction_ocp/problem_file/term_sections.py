@@ -1,4 +1,4 @@
-"""Optional terms of a part: a mapping whose keys are the fields of the term."""
+"""Optional parts of a part: a mapping whose keys are the fields of the term."""
 
 from __future__ import annotations
 
@@ -9,7 +9,16 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, create_model
 
-from friction_ocp.drive.parts import Cogging, Disturbance, Eccentricity, TorqueRipple
+from friction_ocp.drive.parts import (
+    Cogging,
+    Disturbance,
+    Eccentricity,
+    ExternalTorque,
+    Gravity,
+    Hysteresis,
+    KinematicError,
+    TorqueRipple,
+)
 from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.problem_file.numbers import Number
 from friction_ocp.problem_file.sections import Section, given
@@ -19,6 +28,8 @@ def _reader(term: type[Any]) -> Callable[[Any], Any]:
     """Return what reads a mapping into a term."""
 
     def read(value: Any) -> Any:
+        if value is None:
+            return None
         section = _section_of(term).model_validate(value)
         return term(**given(section, *section.keys()))
 
@@ -40,3 +51,7 @@ EccentricityTerm = Annotated[Any, PlainValidator(_reader(Eccentricity))]
 RippleTerm = Annotated[Any, PlainValidator(_reader(Ripple))]
 TorqueRippleTerm = Annotated[Any, PlainValidator(_reader(TorqueRipple))]
 WarmUpTerm = Annotated[Any, PlainValidator(_reader(WarmUp))]
+HysteresisTerm = Annotated[Any, PlainValidator(_reader(Hysteresis))]
+KinematicErrorTerm = Annotated[Any, PlainValidator(_reader(KinematicError))]
+ExternalTorqueTerm = Annotated[Any, PlainValidator(_reader(ExternalTorque))]
+GravityTerm = Annotated[Any, PlainValidator(_reader(Gravity))]

@@ -21,9 +21,12 @@ from friction_ocp.drive.parts import (
     Disturbance,
     Drive,
     Eccentricity,
+    Hysteresis,
+    KinematicError,
     Motor,
     Shaft,
     TorqueRipple,
+    Transmission,
 )
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
@@ -31,7 +34,7 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.modifiers import Ripple, WarmUp
-from friction_ocp.friction.static import Coulomb, CoulombViscous, Polyline, Stribeck
+from friction_ocp.friction.static import Coulomb, CoulombViscous, Polyline, Stribeck, Viscous
 from friction_ocp.parameters import Free
 
 DURATION = 0.4
@@ -108,7 +111,73 @@ def bristle(t: float, x: Sequence[float]) -> list[float]:
     return [omega, (command(t) - 1.0 * z - 0.05 * rate - 0.01 * warmth(t) * omega) / J, rate]
 
 
+def pair(joint: Transmission, motor: Motor | None = None) -> Drive:
+    """Motor and load on an elastic gear of ratio 5, which vibrate at 49 rad/s."""
+    shafts = (Shaft("axis", J, PLAIN), Shaft("load", 0.5, FrictionElement(Viscous(0.1))))
+    channels = (Channel("torque", "servo.torque", "input"), Channel("theta", "axis.theta"))
+    return Drive(shafts, (joint,), (motor or Motor("servo", "axis"),), None, channels)
+
+
+RATIO, STIFFNESS, DAMPING = 5.0, 400.0, 0.5
+ERROR, ERROR_PERIOD = (0.004, -0.003), 1.1
+LOOP_TORQUE, LOOP_TWIST = 1.5, 0.02
+SPRING = Transmission("axis", "load", RATIO, STIFFNESS, DAMPING)
+PAIR_MOVING = {"axis.theta": 0.2, "load.theta": 0.01, "axis.omega": 15.0, "load.omega": 2.0}
+
+
+def two_masses(
+    cubic: float = 0.0, error: tuple[float, float] = (0.0, 0.0), loop: float = 0.0
+) -> Callable[[float, Sequence[float]], list[float]]:
+    """Return the equations of the pair with a cubic spring, a kinematic error over the motor angle, and a loop."""
+
+    def rates(t: float, x: Sequence[float]) -> list[float]:
+        q, p, v, w = x[:4]
+        z = x[4] if len(x) > 4 else 0.0
+        turn = 2 * np.pi / ERROR_PERIOD
+        transfer = 1 / RATIO + turn * (error[1] * np.cos(turn * q) - error[0] * np.sin(turn * q))
+        twist, rate = q / RATIO + wave(error, ERROR_PERIOD, q) - p, transfer * v - w
+        torque = STIFFNESS * twist + cubic * twist**3 + DAMPING * rate + loop * z / LOOP_TWIST
+        motor = (command(t) - 0.1 - 0.02 * v - transfer * torque) / J
+        slip = [rate - abs(rate) * z / LOOP_TWIST] if len(x) > 4 else []
+        return [v, w, motor, (torque - 0.1 * w) / 0.5, *slip]
+
+    return rates
+
+
+LAG = 0.03
+LAGGED = replace(
+    axis(PLAIN, Motor("servo", "axis", 0.4, lag=LAG, saturation=0.2)),
+    channels=(
+        Channel("torque", "servo.current_command", "input"),
+        Channel("temperature", "temperature", "input"),
+        Channel("current", "servo.current"),
+    ),
+)
+
+
+def lagged(t: float, x: Sequence[float]) -> list[float]:
+    torque = 0.4 * x[2] / np.sqrt(1 + 0.2 * x[2] ** 2)
+    return [x[1], (torque - 0.1 - 0.02 * x[1]) / J, (command(t) - x[2]) / LAG]
+
+
 CASES: dict[str, Case] = {
+    "stiffening": Case(pair(replace(SPRING, stiffening=2e5)), PAIR_MOVING, two_masses(2e5)),
+    "kinematic error": Case(
+        pair(replace(SPRING, kinematic_error=KinematicError(*ERROR, ERROR_PERIOD))),
+        PAIR_MOVING,
+        two_masses(error=ERROR),
+    ),
+    "transmission hysteresis": Case(
+        pair(replace(SPRING, hysteresis=Hysteresis(LOOP_TORQUE, LOOP_TWIST))),
+        PAIR_MOVING | {"axis-load.hysteresis.z": 0.002},
+        two_masses(loop=LOOP_TORQUE),
+    ),
+    "lag and saturation": Case(LAGGED, MOVING | {"servo.lagged": 0.2}, lagged),
+    "saturation of a torque": Case(
+        axis(PLAIN, Motor("servo", "axis", 0.5, saturation=0.8)),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) / np.sqrt(1 + 0.8 * (command(t) / 0.5) ** 2) - 0.1 - 0.02 * v),
+    ),
     "cogging": Case(
         axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
         MOVING,
@@ -195,9 +264,14 @@ ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "servo.cogging": lambda off: axis(PLAIN, Motor("servo", "axis", cogging=Cogging(off, off, PERIOD))),
     "servo.torque_ripple": lambda off: axis(PLAIN, Motor("servo", "axis", torque_ripple=TorqueRipple(off, off, 0.9))),
     "axis.disturbance": lambda off: axis(PLAIN, shaft=Shaft("axis", J, disturbance=Disturbance(off, off, 0.2))),
+    "servo.lag": lambda off: axis(PLAIN, Motor("servo", "axis", lag=off)),
+    "servo.saturation": lambda off: axis(PLAIN, Motor("servo", "axis", saturation=off)),
+    "axis-load.stiffening": lambda off: pair(replace(SPRING, stiffening=off)),
+    "axis-load.hysteresis": lambda off: pair(replace(SPRING, hysteresis=Hysteresis(off, LOOP_TWIST))),
+    "axis-load.kinematic_error": lambda off: pair(replace(SPRING, kinematic_error=KinematicError(off, off, 0.9))),
     "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
 }
-AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude")
+AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation", "stiffening", "hysteresis.torque")
 
 
 def sensed(eccentricity: Eccentricity | None) -> Drive:
@@ -207,11 +281,14 @@ def sensed(eccentricity: Eccentricity | None) -> Drive:
     )
 
 
+ABSENT = {"theta": sensed(None), "axis-load": pair(SPRING)}
+
+
 @pytest.mark.parametrize("name", ZERO_TERMS)
 def test_a_plain_zero_costs_nothing(name: str) -> None:
     """A term whose amplitudes are plain zeros leaves no number, input, state or instruction behind."""
     off, _ = step_of(ZERO_TERMS[name](0.0))
-    absent, _ = step_of(sensed(None) if "eccentricity" in name else axis(PLAIN))
+    absent, _ = step_of(ABSENT.get(name.split(".")[0], axis(PLAIN)))
     for made in ("parameter_names", "input_names", "state_names"):
         assert getattr(off, made) == getattr(absent, made)
     assert off.step.n_instructions() == absent.step.n_instructions()
@@ -224,10 +301,12 @@ def test_a_fitted_zero_can_be_scored(name: str, omega: float) -> None:
     """At a guess of 0 every amplitude has a finite derivative, in motion that of a difference quotient and not 0."""
     made, numbers = step_of(ZERO_TERMS[name](Free(0.0)))
     x, p = (ca.SX.sym(symbol, size) for symbol, size in (("x", len(made.state_names)), ("p", numbers.size)))
-    u = [{"torque": 0.4, "temperature": 30.0, TIME: 0.13}[item] for item in made.input_names]
-    after = ca.vertcat(made.step(x, u, p, 1e-3, [0, 0]), made.output(x, u, p, 1e-3, [0, 0]))
+    inputs = [{"torque": 0.4, "temperature": 30.0, TIME: 0.13}[item] for item in made.input_names]
+    width = np.zeros(len(made.mechanism.topology.roots) + 1)
+    after = ca.vertcat(made.step(x, inputs, p, 1e-3, width), made.output(x, inputs, p, 1e-3, width))
     function = ca.Function("after", [x, p], [after, ca.jacobian(after, p)])
-    state = [0.4, omega]
+    moving = {"axis.theta": 0.4, "axis.omega": omega, "servo.lagged": 0.3, "axis-load.hysteresis.z": 2e-3}
+    state = [moving.get(item, 0.0) for item in made.state_names]
     _, slope = function(state, numbers)
     slope = np.asarray(slope)
     assert np.all(np.isfinite(slope))
@@ -237,6 +316,17 @@ def test_a_fitted_zero_can_be_scored(name: str, omega: float) -> None:
         quotient = np.asarray(more - less).ravel() / (2 * beside)
         assert omega == 0.0 or np.any(quotient != 0.0)
         assert slope[:, k] == pytest.approx(quotient, rel=curvature, abs=curvature * np.abs(quotient).max())
+
+
+@pytest.mark.parametrize("lag", [0.0, 1e-6, 1e-4, 1e-3, 1e-2])
+def test_a_lag_of_any_size_delays_a_ramp_by_itself(lag: float) -> None:
+    """Behind a ramp of the command the current is late by the lag, for lags far below the step and far above it."""
+    motor = Motor("servo", "axis", 0.4, lag=Free(lag))
+    ramp = Trajectory(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "linear")
+    drive = replace(LAGGED, shafts=(Shaft("axis", J),), motors=(motor,))
+    run = Bench(drive).run(0.3, {"torque": ramp, "temperature": 0.0})
+    settled = run.time > 10 * lag + 2e-3
+    assert run["current"][settled] == pytest.approx(run.time[settled] - lag, abs=1e-6)
 
 
 def test_a_shaft_sticks_up_to_the_friction_of_its_angle() -> None:

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from plant import (
     Plant,
+    PlantAmplifier,
     PlantFriction,
+    PlantLoop,
     PlantMotor,
     PlantRipple,
+    PlantSaturation,
     PlantSensor,
     PlantShaft,
     PlantTransmission,
@@ -23,7 +26,7 @@ from twin import Twin, worst
 STEP_ERROR = 4e-4
 """Relative error of steps of 1 ms with a dozen stops and a joint that vibrates at 49 rad/s."""
 BRISTLE = 2e-3
-"""The same of a bristle with rates frozen over a step."""
+"""The same of a bristle with rates frozen over a step, and of impacts within one."""
 
 COULOMB = PlantFriction("coulomb_viscous", tau_c=(0.2, 0.25), viscous=0.02)
 LOAD = PlantShaft("load", 0.5, PlantFriction("coulomb_viscous", tau_c=0.3, viscous=0.05))
@@ -46,6 +49,20 @@ PLANTS: dict[str, Plant] = {
     "friction ripple, lugre": pair(replace(SHAFT, friction=LUGRE, ripple=RIPPLE)),
     "disturbance": pair(replace(SHAFT, disturbance=PlantRipple(0.11, 0.05, 0.1))),
     "warm-up": pair(replace(SHAFT, warm_up=PlantWarmUp(0.8, -0.4, -0.4))),
+    "lag": pair(motor=replace(MOTOR, amplifier=PlantAmplifier(time_constant=0.02))),
+    "saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 2.0))),
+    "stiffening": pair(joint=replace(JOINT, cubic=3e5)),
+    "hysteresis": pair(joint=replace(JOINT, loop=PlantLoop(((1.0, 0.003),), smooth=True))),
+    "kinematic error": pair(joint=replace(JOINT, kinematic_error=PlantRipple(0.7, 0.003, 0.004))),
+    "backlash and all of these": pair(
+        joint=replace(
+            JOINT,
+            cubic=3e5,
+            backlash=0.004,
+            loop=PlantLoop(((1.0, 0.003),), smooth=True),
+            kinematic_error=PlantRipple(0.7, 0.003, 0.004),
+        )
+    ),
     "several together": pair(
         replace(SHAFT, ripple=RIPPLE, warm_up=PlantWarmUp(0.8, 0.3, 0.3)),
         replace(MOTOR, cogging=PlantRipple(0.3, 0.02, 0.03), torque_ripple=RIPPLE),
@@ -63,7 +80,7 @@ def test_terms_follow_the_plant(name: str) -> None:
     """Under reversing current steps both shafts move as in the plant, through stops and whole periods."""
     twin = Twin(PLANTS[name], {"drive.current": reversals()})
     truth, run = twin.run(2.0)
-    tolerance = BRISTLE if "lugre" in name else STEP_ERROR
+    tolerance = BRISTLE if "lugre" in name or "backlash" in name else STEP_ERROR
     assert worst(truth, run, "motor.theta", "motor.omega", "load.theta", "load.omega") < tolerance
     without = Twin(pair(), {"drive.current": reversals()}).run(2.0)[1]
     assert worst(truth, without, "motor.omega") > 20 * STEP_ERROR

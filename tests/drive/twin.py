@@ -16,6 +16,7 @@ from plant import (
     PlantRipple,
     PlantSensor,
     PlantShaft,
+    PlantTransmission,
     PlantWarmUp,
     Trajectory,
 )
@@ -30,6 +31,8 @@ from friction_ocp.drive.parts import (
     Eccentricity,
     ExternalTorque,
     Gravity,
+    Hysteresis,
+    KinematicError,
     Motor,
     Shaft,
     TorqueRipple,
@@ -119,8 +122,25 @@ def _shaft(shaft: PlantShaft) -> Shaft:
     )
 
 
+def _transmission(item: PlantTransmission) -> Transmission:
+    loop, stiffness = item.loop, item.stiffness if np.isfinite(item.stiffness) else None
+    assert item.second_stage == (0.0, 0.0) and (loop is None or (loop.smooth and len(loop.elements) == 1))
+    return Transmission(
+        item.from_shaft,
+        item.to_shaft,
+        item.ratio,
+        stiffness,
+        item.damping,
+        item.backlash,
+        item.cubic,
+        None if loop is None else Hysteresis(*loop.elements[0]),
+        _wave(KinematicError, item.kinematic_error),
+    )
+
+
 def _motor(motor: PlantMotor) -> Motor:
-    voltage = motor.drive == "voltage"
+    voltage, saturation = motor.drive == "voltage", motor.saturation
+    assert saturation is None or (saturation.form, saturation.sharpness) == ("algebraic", 2.0)
     return Motor(
         motor.name,
         motor.shaft,
@@ -130,6 +150,8 @@ def _motor(motor: PlantMotor) -> Motor:
         motor.share,
         _wave(Cogging, motor.cogging),
         _wave(TorqueRipple, motor.torque_ripple),
+        0.0 if motor.amplifier is None else motor.amplifier.time_constant,
+        0.0 if saturation is None else saturation.current**-2.0,
     )
 
 
@@ -159,17 +181,7 @@ def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
         driven.append(Channel("supply", f"{plant.motors[0].name}.supply_voltage", "input"))
     return Drive(
         shafts=tuple(_shaft(shaft) for shaft in plant.shafts),
-        transmissions=tuple(
-            Transmission(
-                t.from_shaft,
-                t.to_shaft,
-                t.ratio,
-                t.stiffness if np.isfinite(t.stiffness) else None,
-                t.damping,
-                t.backlash,
-            )
-            for t in plant.transmissions
-        ),
+        transmissions=tuple(_transmission(t) for t in plant.transmissions),
         motors=tuple(_motor(motor) for motor in plant.motors),
         controller=_controller(plant.controllers[0], plant.motors[0].drive) if plant.controllers else None,
         channels=(*driven, *sensors, *(Channel(name, name) for name in seen)),
@@ -204,7 +216,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         made = stepped(self.drive)
-        values = {leaf.path: leaf.value for leaf in drive_leaves(self.drive)}
+        values = {leaf.path: getattr(leaf.value, "guess", leaf.value) for leaf in drive_leaves(self.drive)}
         object.__setattr__(self, "stepped", made)
         object.__setattr__(self, "numbers", np.array([float(values[name]) for name in made.parameter_names]))
 
@@ -274,11 +286,22 @@ class Twin:
         self, duration: float, initial: Mapping[str, float] | None = None, supply: float = 1.0, step: float = 1e-3
     ) -> tuple[Run, Run]:
         """Return the plant's truth and the free run of the drive, both every 1 ms from the same start."""
-        first = {name: value for name, value in (initial or {}).items() if not name.startswith("controller.")}
+        initial = self._commanded() | dict(initial or {})
+        ours_alone = ("controller.", ".lagged")
+        first = {name: value for name, value in initial.items() if not any(part in name for part in ours_alone)}
         done = self.plant.simulate(duration, self.inputs, initial=first, truth_rate=1000, step=PLANT_STEP)
         recorded = {name: np.interp(done.truth["time"], *channel) for name, channel in done.channels.items()}
         truth = Run(done.truth["time"], done.truth | recorded)
-        return truth, self.bench.run(duration, {**self.inputs, "supply": supply}, self._states(initial or {}), step)
+        return truth, self.bench.run(duration, {**self.inputs, "supply": supply}, self._states(initial), step)
+
+    def _commanded(self) -> dict[str, float]:
+        """Return what the motors that lag begin with, as in the plant: their first commands."""
+        begins: dict[str, float] = {}
+        for motor in self.plant.motors:
+            command = self.inputs.get(f"{motor.name}.{motor.drive}", 0.0)
+            begin = float(command.value[0]) if isinstance(command, Trajectory) else command
+            begins[f"{motor.name}.lagged"] = motor.share * begin
+        return begins
 
     def _states(self, initial: Mapping[str, float]) -> dict[str, float]:
         return {re.sub(r"\.z(\d*)$", r".friction.z\1", name): value for name, value in initial.items()}

@@ -132,6 +132,18 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         several(put("drive/shafts", TWO_SHAFTS), put("drive/transmissions", [{"stiffness": "rigid", "backlash": 0.1}])),
         "drive.transmissions[0].backlash: backlash of a rigid transmission has no effect",
     ),
+    "loop of a rigid joint": (
+        several(
+            put("drive/shafts", TWO_SHAFTS),
+            put("drive/transmissions", [{"stiffness": "rigid", "hysteresis": {"torque": 1, "twist": 0.1}}]),
+        ),
+        "drive.transmissions[0].hysteresis: hysteresis of a rigid transmission has no effect; state a stiffness",
+    ),
+    "negative saturation": (
+        put("drive/motor/saturation", -1),
+        "drive.motor.saturation: saturation = -1 1/A^2; must not be negative",
+    ),
+    "negative lag": (put("drive/motor/lag", -1), "drive.motor.lag: lag = -1 s; must not be negative"),
     "break count": (
         put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [1, 2]}),
         "drive.shafts[0].friction.breaks: there are 2 breaks for 2 slopes; 1 breaks: one fewer than slopes",

@@ -216,3 +216,22 @@ def test_terms_are_read_under_their_paths(workshop: Workshop) -> None:
     assert values["load.friction.warm_up.amplitude"] == 0.1
     assert values["load.friction.warm_up.time_constant"] == Free(60.0)
     assert values["position.eccentricity.sine"] == Tie("0.1 * motor.cogging.sine")
+
+
+def test_terms_of_a_gear_are_read_under_their_paths(workshop: Workshop) -> None:
+    """What shapes the twist of a transmission, and what makes a motor late and weak, has its keys and paths."""
+
+    def spoil(content: dict[str, Any]) -> None:
+        drive = content["drive"]
+        drive["shafts"].append({"name": "arm", "inertia": 0.1})
+        joint = {"stiffness": 100, "stiffening": {"guess": 0}, "hysteresis": {"torque": {"guess": 0}, "twist": 0.01}}
+        joint["kinematic_error"] = {"cosine": 0.001, "sine": 0, "period": 0.5}
+        drive["transmissions"] = [joint]
+        drive["motor"] |= {"lag": {"guess": 0, "min": 0, "max": 0.1}, "saturation": 0.01}
+
+    problem = load_problem(workshop.problem(spoil))
+    values = {leaf.path: leaf.value for leaf in drive_leaves(problem.drive)}
+    assert values["load-arm.stiffening"] == values["load-arm.hysteresis.torque"] == Free(0.0)
+    assert (values["load-arm.hysteresis.twist"], values["load-arm.kinematic_error.cosine"]) == (0.01, 0.001)
+    assert (values["motor.lag"], values["motor.saturation"]) == (Free(0.0, 0.0, 0.1), 0.01)
+    assert [str(item) for item in check(problem) if item.severity == "error"] == []

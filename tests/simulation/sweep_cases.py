@@ -15,6 +15,8 @@ from friction_ocp.drive.parts import (
     Drive,
     Eccentricity,
     Gravity,
+    Hysteresis,
+    KinematicError,
     Motor,
     Shaft,
     TorqueRipple,
@@ -95,7 +97,23 @@ def every_term() -> Drive:
     return Drive((shaft,), (), (motor,), None, (TORQUE, warm, eccentric, *outputs("motor.alpha")))
 
 
+def every_flaw_of_a_joint() -> Drive:
+    """Two masses on a spring that stiffens, with play, a loop and a kinematic error; a late motor that saturates."""
+    shafts = (
+        Shaft("motor", 0.01, FrictionElement(CoulombViscous(0.1, 0.02))),
+        Shaft("load", 0.2, FrictionElement(CoulombViscous(0.2, 0.1), LoadDependence(0.1))),
+    )
+    joint = Transmission(
+        *("motor", "load", 4.0, 50.0, 0.3, 0.02, 400.0),
+        hysteresis=Hysteresis(0.4, 0.05),
+        kinematic_error=KinematicError(0.01, 0.02, 0.5),
+    )
+    motor = Motor("motor", "motor", lag=0.01, saturation=0.5)
+    return Drive(shafts, (joint,), (motor,), None, (TORQUE, *outputs("motor.theta", "load.omega", "motor.torque")))
+
+
 DRIVES = {
+    "every flaw of a joint": every_flaw_of_a_joint,
     "every term": every_term,
     "one mass": one_mass,
     "two masses": two_masses,

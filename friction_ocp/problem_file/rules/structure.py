@@ -9,6 +9,7 @@ from friction_ocp.drive.parts import Transmission
 from friction_ocp.drive.topology import topology
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.expressions import closest
+from friction_ocp.parameters import is_off
 from friction_ocp.problem_file.rules.case import Case, Rule
 
 
@@ -64,7 +65,7 @@ def rigid_joints_form_no_loop(case: Case) -> Iterator[Finding]:
 
 
 def rigid_joints_have_no_play(case: Case) -> Iterator[Finding]:
-    """Damping and backlash need a spring to act beside."""
+    """Damping, backlash and what else shapes the twist need a spring to act beside."""
     for k, item in enumerate(case.drive.transmissions):
         if item.rigid:
             for key in _idle_numbers(item):
@@ -75,7 +76,9 @@ def rigid_joints_have_no_play(case: Case) -> Iterator[Finding]:
 
 
 def _idle_numbers(item: Transmission) -> list[str]:
-    return [key for key in ("damping", "backlash") if getattr(item, key) != 0.0]
+    numbers = [key for key in ("damping", "backlash", "stiffening") if not is_off(getattr(item, key))]
+    terms = (("hysteresis", item.hysteresis), ("kinematic_error", item.kinematic_error))
+    return numbers + [key for key, term in terms if term is not None]
 
 
 def _unknown_shaft(where: str, name: str, names: list[str]) -> Finding:

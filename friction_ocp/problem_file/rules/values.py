@@ -14,9 +14,9 @@ from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 
 _POSITIVE = {
     *("resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"),
-    *("width", "period", "time_constant"),
+    *("width", "period", "time_constant", "twist"),
 }
-_NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash"}
+_NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag"}
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
@@ -48,7 +48,7 @@ def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
         key = next(part for part in reversed(path.split(".")) if part not in _DIRECTIONS and not part.isdigit())
         impossible = [
             (key in _POSITIVE and number <= 0, "must be positive"),
-            (key in _NOT_NEGATIVE and number < 0, "must not be negative"),
+            ((key in _NOT_NEGATIVE or case.leaves[path].kind == "saturation") and number < 0, "must not be negative"),
             (key in _NOT_ZERO and number == 0, "must not be zero"),
         ]
         for _, allowed in (item for item in impossible if item[0]):
