@@ -107,9 +107,11 @@ def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> A
     """Return |torque| that loads the friction of a shaft, on the shaft's own side."""
     if shaft.friction.load is None:
         return 0.0
-    joint = mech.load_joint(shaft)
-    torque = load[joint.name]
-    return smooth_abs(torque / joint.ratio if joint.from_shaft == shaft.name else torque)
+    torques = [
+        load[joint.name] / joint.ratio if joint.from_shaft == shaft.name else load[joint.name]
+        for joint in mech.load_joints(shaft)
+    ]
+    return smooth_abs(sum(torques[1:], torques[0]))
 
 
 def _solve(

@@ -143,18 +143,19 @@ class Mechanism:
 
     def loaded_joints(self) -> tuple[Transmission, ...]:
         """Rigid joints whose transmitted torque some friction depends on: the algebraic variables."""
-        joints = {self.load_joint(shaft).name for shaft in self.drive.shafts if shaft.friction.load is not None}
+        loaded = [shaft for shaft in self.drive.shafts if shaft.friction.load is not None]
+        joints = {joint.name for shaft in loaded for joint in self.load_joints(shaft)}
         return tuple(joint for joint in self.topology.rigid if joint.name in joints)
 
-    def load_joint(self, shaft: Shaft) -> Transmission:
-        """Return the transmission that loads a shaft: its output side, else its input side."""
+    def load_joints(self, shaft: Shaft) -> tuple[Transmission, ...]:
+        """Return the transmissions that load a shaft: all on its output side, else all on its input side."""
         drive = self.drive
         onward = [item for item in drive.transmissions if item.from_shaft == shaft.name]
         backward = [item for item in drive.transmissions if item.to_shaft == shaft.name]
         if not onward + backward:
             what = "friction depends on the transmitted torque, but no transmission ends here"
             raise FrictionOcpError(Finding(f"{shaft.name}.friction.load", what, remedy="leave the load dependence out"))
-        return (onward + backward)[0]
+        return tuple(onward or backward)
 
     def shaft_angle(self, name: str, motion: Motion) -> Any:
         """Return the angle of a shaft."""
@@ -196,16 +197,10 @@ class Mechanism:
         """Return what drives a motor: torque, current or voltage; None where nothing does."""
         given = {channel.measures for channel in self.drive.inputs}
         controller = self.drive.controller
-        ways = {
-            "torque": ("torque",),
-            "current": ("current", "current_command"),
-            "voltage": ("voltage",),
-        }
-        for signal, measured in ways.items():
-            commanded = controller is not None and controller.output == signal
-            if commanded or any(f"{motor.name}.{name}" in given for name in measured):
+        for signal in ("torque", "current", "voltage"):
+            if f"{motor.name}.{signal}" in given or (controller is not None and controller.output == signal):
                 return signal
-        return None
+        return "current" if f"{motor.name}.current_command" in given else None
 
 
 def mechanism(drive: Drive) -> Mechanism:

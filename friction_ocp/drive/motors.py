@@ -78,12 +78,11 @@ def _driving(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
 
 def motor_command(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque, current or voltage that a motor is to follow."""
-    signal = mech.driving_signal(motor)
-    for name in (signal, "current_command") if signal == "current" else (signal,):
-        given = mech.true_input(f"{motor.name}.{name}")
-        if given is not None:
-            return motor.share * given
-    controller = mech.drive.controller
+    given, controller = mech.true_input(f"{motor.name}.{mech.driving_signal(motor)}"), mech.drive.controller
+    if given is None and controller is None:
+        given = mech.true_input(f"{motor.name}.current_command")
+    if given is not None:
+        return motor.share * given
     assert controller is not None
     wanted = motor.share * _controlled(mech, controller, motion)
     supply = mech.true_input(f"{motor.name}.supply_voltage") if controller.type == "duty" else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.drive.kick import transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion
-from friction_ocp.drive.parts import Shaft
+from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.drive.torques import elastic_torque
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.score import FreeRun
@@ -67,14 +67,7 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
     mech = model.drive.mechanism
     q = ca.SX.sym("q", len(mech.topology.roots))
     at = Motion(q, ca.SX.zeros(q.numel()), ca.SX.zeros(8), ca.SX.zeros(16))
-    joint = mech.load_joint(shaft)
-    if joint.rigid:
-        beyond = mech.topology.beyond(joint)
-        torque = sum(_gravity(mech, name, at) * mech.topology.speed_ratio[name] for name in beyond)
-        torque = torque / mech.topology.speed_ratio[joint.to_shaft]
-    else:
-        torque = elastic_torque(mech, joint, at, 0.0)
-    size = transmitted_torque(mech, shaft, {joint.name: ca.SX(torque)})
+    size = transmitted_torque(mech, shaft, {joint.name: _held(mech, joint, at) for joint in mech.load_joints(shaft)})
     inputs = ca.vertcat(*mech.inputs.values())
     function = ca.Function("load", [q, inputs, ca.vertcat(*mech.parameters.values())], [size])
     largest = 0.0
@@ -87,6 +80,15 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
         return [0.0]
     shown = float(f"{largest:.2g}")
     return [0.0, 0.5 * shown, shown]
+
+
+def _held(mech: Mechanism, joint: Transmission, at: Motion) -> ca.SX:
+    """Return the torque through a joint that its spring, or gravity beyond it, holds at rest."""
+    if not joint.rigid:
+        return ca.SX(elastic_torque(mech, joint, at, 0.0))
+    ratio = mech.topology.speed_ratio
+    torque = sum(_gravity(mech, name, at) * ratio[name] for name in mech.topology.beyond(joint))
+    return ca.SX(torque / ratio[joint.to_shaft])
 
 
 def _gravity(mech: Mechanism, name: str, at: Motion) -> ca.SX:

@@ -89,7 +89,7 @@ def _with_start(model: Model, cut: Segments) -> Segments:
     weight = np.zeros((cut.count, model.state_scale.size))
     weight[0] = 1.0 / model.state_scale
     if cut.gap_weight is None:
-        bristles = [".friction.z" in name for name in model.drive.state_names]
+        bristles = [".friction.z" in name or ".hysteresis.z" in name for name in model.drive.state_names]
         weight[:, bristles] = weight[0, bristles]
     return replace(cut, start_weight=weight)
 

@@ -270,9 +270,10 @@ class ProblemSection(Section):
             )
         measured = {channel.measures for channel in self.channels.values()}
         controller = self.controller or self.drive.controller
+        electrical = ("current", "current_command", "voltage")
         by_controller = controller is not None and controller.output != "torque"
         for location, motor in self.drive.placed_motors:
-            electric = by_controller or measured & {f"{motor.name}.current", f"{motor.name}.voltage"}
+            electric = by_controller or measured & {f"{motor.name}.{name}" for name in electrical}
             if electric and "torque_constant" not in motor.model_fields_set:
                 place = ("drive", *location, "torque_constant")
                 faults.append(Fault(place, "this key is missing", NUMBER_FORMS, number=place))

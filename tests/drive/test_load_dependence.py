@@ -127,3 +127,21 @@ def test_random_geared_loads_follow_the_plant(seed: int) -> None:
     truth, _ = twin.run(1.0)
     finer = twin.bench.run(1.0, {"drive.current": current}, step=2.5e-4)
     assert worst(truth, finer, "motor.theta", "motor.omega") < STEP_ERROR
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 300.0], ids=["rigid", "elastic"])
+def test_a_shaft_with_two_branches_carries_both_torques(stiffness: float) -> None:
+    """The friction of a shaft that drives two loads grows with the sum of what it passes on to them."""
+    damping = 0.5 if np.isfinite(stiffness) else 0.0
+    shafts = (
+        PlantShaft("motor", 0.01, PlantFriction("coulomb", 0.1, load_coulomb=0.3)),
+        PlantShaft("left", 0.3, PlantFriction("coulomb", 0.2), (2.0, 0.3)),
+        PlantShaft("right", 0.2, PlantFriction("viscous", viscous=0.1), (1.0, -0.5)),
+    )
+    joints = tuple(
+        PlantTransmission("motor", name, ratio, stiffness, damping) for name, ratio in (("left", 4.0), ("right", -6.0))
+    )
+    twin = Twin(Plant(shafts, joints, MOTOR), {"drive.current": reversals()})
+    truth, _ = twin.run(1.0)
+    finer = twin.bench.run(1.0, {"drive.current": reversals()}, step=2.5e-4)
+    assert worst(truth, finer, "motor.theta", "motor.omega") < STEP_ERROR

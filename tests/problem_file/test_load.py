@@ -235,3 +235,20 @@ def test_terms_of_a_gear_are_read_under_their_paths(workshop: Workshop) -> None:
     assert (values["load-arm.hysteresis.twist"], values["load-arm.kinematic_error.cosine"]) == (0.01, 0.001)
     assert (values["motor.lag"], values["motor.saturation"]) == (Free(0.0, 0.0, 0.1), 0.01)
     assert [str(item) for item in check(problem) if item.severity == "error"] == []
+
+
+def test_a_commanded_current_drives_a_motor_whose_current_is_predicted(workshop: Workshop) -> None:
+    """With the command as the input and the current as an output nothing is missing from the problem."""
+
+    def spoil(content: dict[str, Any]) -> None:
+        content["channels"]["command"] = {"measures": "motor.current_command"}
+        content["channels"]["current"]["role"] = "output"
+        content["drive"]["motor"]["lag"] = {"guess": 0.0, "min": 0.0, "max": 0.1}
+
+    def record(file: Any) -> None:
+        file.copy("/channels/current", "/channels/command")
+
+    workshop.recording(spoil=record)
+    problem = load_problem(workshop.problem(spoil))
+    assert [channel.name for channel in problem.drive.inputs] == ["command"]
+    assert [str(item) for item in check(problem) if item.severity == "error"] == []

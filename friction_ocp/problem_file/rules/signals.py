@@ -63,7 +63,10 @@ def inputs_are_single(case: Case) -> Iterator[Finding]:
 def ways_of_driving(drive: Drive, motor: Motor) -> list[str]:
     """Return what makes a motor turn: the signals given to it, and the controller's command."""
     ways = [f"{motor.name}.{signal}" for signal in DRIVING_SIGNALS if _is_input(drive, f"{motor.name}.{signal}")]
-    return ways if drive.controller is None else [*ways, f"controller ({drive.controller.output})"]
+    if drive.controller is not None:
+        return [*ways, f"controller ({drive.controller.output})"]
+    command = f"{motor.name}.current_command"
+    return [command] if not ways and _is_input(drive, command) else ways
 
 
 def _is_input(drive: Drive, measures: str) -> bool:
@@ -72,6 +75,8 @@ def _is_input(drive: Drive, measures: str) -> bool:
 
 def _kinds_of_driving(drive: Drive, motor: Motor) -> set[str]:
     kinds = {signal for signal in DRIVING_SIGNALS if _is_input(drive, f"{motor.name}.{signal}")}
+    if not kinds and drive.controller is None and _is_input(drive, f"{motor.name}.current_command"):
+        return {"current"}
     return kinds if drive.controller is None else kinds | {drive.controller.output}
 
 
@@ -81,11 +86,13 @@ def is_prescribed(drive: Drive) -> bool:
 
 
 def motors_are_driven(case: Case) -> Iterator[Finding]:
-    """Each motor follows a measured current, torque or voltage, or the controller."""
+    """Each motor follows a measured current, torque or voltage, a commanded current, or the controller."""
     drive = case.drive
     for k, motor in enumerate(drive.motors):
         if not ways_of_driving(drive, motor) and not is_prescribed(drive):
-            allowed = f"an input channel for {motor.name}.current, .torque or .voltage, or a controller"
+            allowed = (
+                f"an input channel for {motor.name}.current, .current_command, .torque or .voltage, or a controller"
+            )
             yield Finding(case.at(case.place_of_motor(k)), f"nothing drives motor '{motor.name}'", allowed)
 
 
