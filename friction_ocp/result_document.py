@@ -62,7 +62,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             for recording, tests in estimate.residuals.items()
         },
         "channel_units": dict(estimate.simulation.units),
-        "provenance": _provenance(estimate.problem),
+        "provenance": provenance(estimate.problem),
     }
 
 
@@ -77,7 +77,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "parameters": {},
         "fit": _fit(simulation),
         "channel_units": dict(simulation.units),
-        "provenance": _provenance(simulation.problem),
+        "provenance": provenance(simulation.problem),
     }
 
 
@@ -165,7 +165,8 @@ def _whiteness(test: Whiteness) -> dict[str, Any]:
     }
 
 
-def _provenance(problem: Problem) -> dict[str, Any]:
+def provenance(problem: Problem) -> dict[str, Any]:
+    """Return versions, date, seed and checksums of the recordings."""
     packages = ("friction-ocp", "casadi", "numpy", "scipy")
     return {
         **{name.replace("-", "_"): importlib.metadata.version(name) for name in packages},
@@ -183,8 +184,13 @@ def simulation_series(simulation: Simulation) -> dict[str, RecordingSeries]:
 
 
 def _series(run: FreeRun, simulation: Simulation) -> RecordingSeries:
+    return run_series(run, simulation.units, simulation.state_names)
+
+
+def run_series(run: FreeRun, units: Mapping[str, str], state_names: tuple[str, ...]) -> RecordingSeries:
+    """Return measured and simulated channels and the states of one free run."""
     channels: dict[str, ChannelSeries] = {}
-    for column, (name, unit) in enumerate(simulation.units.items()):
+    for column, (name, unit) in enumerate(units.items()):
         at = np.isfinite(run.measured[:, column])
         if at.any():
             # a channel keeps the nodes between its first and last sample, missing ones as NaN
@@ -192,5 +198,5 @@ def _series(run: FreeRun, simulation: Simulation) -> RecordingSeries:
             channels[name] = ChannelSeries(
                 run.time[inside], run.measured[inside, column], run.simulated[inside, column], unit
             )
-    states = {name: run.states[:, k] for k, name in enumerate(simulation.state_names)}
+    states = {name: run.states[:, k] for k, name in enumerate(state_names)}
     return RecordingSeries(channels, StateSeries(run.time, states))

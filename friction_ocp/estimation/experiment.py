@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +62,21 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         smooth=np.column_stack([value for value, _ in motions]),
         rate=np.column_stack([rate for _, rate in motions]),
     )
+
+
+def with_inputs(item: Experiment, known: Sequence[str], wanted: Sequence[str], recording: Recording) -> Experiment:
+    """Return an experiment whose grid holds the inputs `wanted` in their order: those `known`, and the time."""
+    if tuple(known) == tuple(wanted):
+        return item
+    grid, start = item.grid, _clock(recording).time[0]
+    ends = np.append(grid.time[1:], grid.time[-1])
+    clocks = {"at_start": grid.time - start, "at_end": ends - start, "at_node": grid.time - start}
+    columns = {
+        key: np.column_stack([clock if name == TIME else getattr(grid, key)[:, known.index(name)] for name in wanted])
+        for key, clock in clocks.items()
+    }
+    laid = {key: np.ascontiguousarray(values, dtype=np.float64) for key, values in columns.items()}
+    return replace(item, grid=replace(grid, **laid))
 
 
 def _input_signal(use: RecordingUse, channel: Channel) -> InputSignal:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.estimation.experiment import Experiment, experiment
+from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.problem import Problem, RecordingUse
@@ -89,6 +90,47 @@ def prepare(problem: Problem) -> Model:
         speeds=_speeds(drive, space, problem, states),
         max_step=max_step,
     )
+
+
+def with_drive(model: Model, drive: Drive) -> Model:
+    """Return the same recordings seen by another drive of the same channels; floors and node times stay."""
+    problem = replace(model.problem, drive=drive)
+    after = stepped(drive)
+    space = parameter_space(problem, after.parameter_names)
+    sweep = Sweep(after, space.active)
+    max_step = model.max_step
+    if model.problem.estimation.max_step is None:
+        max_step = min(max_step, integrator_step(after, space, problem))
+    train, validation = (
+        tuple(_with_step(seen_by(model, after, item), max_step, model.max_step) for item in items)
+        for items in (model.train, model.validation)
+    )
+    states = np.concatenate([_suggested(sweep, space, item) for item in train])
+    return replace(
+        model,
+        problem=problem,
+        drive=after,
+        space=space,
+        sweep=sweep,
+        train=train,
+        validation=validation,
+        speed_scale=_speed_scale(after, states),
+        state_scale=_state_scale(states),
+        max_step=max_step,
+    )
+
+
+def seen_by(model: Model, drive: SteppedDrive, item: Experiment) -> Experiment:
+    """Return a recording of a model, or a piece of one, with the inputs of another drive of the same channels."""
+    recording = next(use.recording for use in model.problem.recordings if use.name == item.name)
+    return with_inputs(item, model.drive.input_names, drive.input_names, recording)
+
+
+def _with_step(item: Experiment, max_step: float, known: float) -> Experiment:
+    if max_step >= known:
+        return item
+    substeps = np.maximum(1, np.ceil(item.grid.dt / max_step - 1e-9)).astype(np.int64)
+    return replace(item, grid=replace(item.grid, substeps=substeps))
 
 
 def _try_experiment(
@@ -172,11 +214,20 @@ def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> Com
 
     What follows a command late is left out: the step is exact in it, however short its time constant.
     """
+    kept = [k for k, name in enumerate(drive.state_names) if not name.endswith(".lagged")]
+    return np.linalg.eigvals(standstill_slope(drive, numbers, inputs)[np.ix_(kept, kept)]).astype(complex)
+
+
+def standstill_slope(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> FloatArray:
+    """Return (states, states) how the states' rates depend on the states at standstill, without dry friction."""
     tiny, states = 1e-6, len(drive.state_names)
     x = ca.SX.sym("x", states)
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
     after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
     slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])
-    rates = (np.asarray(slope(np.zeros(states))) - np.eye(states)) / tiny
-    kept = [k for k, name in enumerate(drive.state_names) if not name.endswith(".lagged")]
-    return np.linalg.eigvals(rates[np.ix_(kept, kept)]).astype(complex)
+    return (np.asarray(slope(np.zeros(states))) - np.eye(states)) / tiny
+
+
+def typical_inputs(problem: Problem, drive: SteppedDrive) -> list[float]:
+    """Return a typical value of every input in the first training recording."""
+    return [_typical(problem.train[0], name) for name in drive.input_names]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,7 +12,22 @@ from friction_ocp.parameters import Value, quantity
 
 
 @dataclass(frozen=True)
-class LuGre(AbstractFrictionLaw):
+class AbstractBristleLaw(AbstractFrictionLaw):
+    """A law with sigma0, sigma1 and sigma2: stiffness and damping of its bristle, and viscous friction."""
+
+    has_bristle: ClassVar[bool] = True
+
+    @abstractmethod
+    def level(self, speed: Any) -> Any:
+        """Return the torque of the fully deflected bristle."""
+
+    def magnitude(self, speed: Any) -> Any:
+        viscous: Any = getattr(self, "sigma2")  # noqa: B009
+        return self.level(speed) + viscous * speed
+
+
+@dataclass(frozen=True)
+class LuGre(AbstractBristleLaw):
     r"""LuGre friction: bristle deflection z with Stribeck weakening.
 
     .. math::
@@ -32,7 +48,6 @@ class LuGre(AbstractFrictionLaw):
     sigma2: Value = quantity("viscous", "viscous friction", 0.0)
     delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0, nested="guess")
     name: ClassVar[str] = "lugre"
-    has_bristle: ClassVar[bool] = True
 
     def weakening(self, speed: Any) -> Any:
         return stribeck_share(speed, self.omega_s, self.delta)
@@ -41,12 +56,9 @@ class LuGre(AbstractFrictionLaw):
         """Return g(speed), the torque of the fully deflected bristle."""
         return self.tau_c + (self.tau_s - self.tau_c) * self.weakening(speed)
 
-    def magnitude(self, speed: Any) -> Any:
-        return self.level(speed) + self.sigma2 * speed
-
 
 @dataclass(frozen=True)
-class Dahl(AbstractFrictionLaw):
+class Dahl(AbstractBristleLaw):
     r"""Dahl friction: a bristle without weakening or damping.
 
     .. math:: \dot z = \omega - \frac{\sigma_0 |\omega|}{\tau_c} z, \qquad \tau_f = \sigma_0 z + \sigma_2 \omega
@@ -58,12 +70,8 @@ class Dahl(AbstractFrictionLaw):
     sigma0: Value = quantity("stiffness", "bristle stiffness")
     sigma2: Value = quantity("viscous", "viscous friction", 0.0)
     name: ClassVar[str] = "dahl"
-    has_bristle: ClassVar[bool] = True
     sigma1: ClassVar[float] = 0.0
 
     def level(self, speed: Any) -> Any:
         """Return the torque of the fully deflected bristle."""
         return self.tau_c + 0.0 * speed
-
-    def magnitude(self, speed: Any) -> Any:
-        return self.level(speed) + self.sigma2 * speed

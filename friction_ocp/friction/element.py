@@ -12,7 +12,7 @@ from typing import Any
 
 import casadi as ca
 
-from friction_ocp.friction.bristle import Dahl, LuGre
+from friction_ocp.friction.bristle import AbstractBristleLaw
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction, times
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip, Play
 from friction_ocp.friction.modifiers import Ripple, Surroundings, WarmUp
@@ -110,11 +110,11 @@ class FrictionElement:
         ]
         return self._sigma(0, deflection) * speed / where(omega >= 0, levels[0], levels[1])
 
-    def _bristles(self) -> list[tuple[Direction, LuGre | Dahl]]:
-        sides: list[tuple[Direction, LuGre | Dahl]] = []
+    def _bristles(self) -> list[tuple[Direction, AbstractBristleLaw]]:
+        sides: list[tuple[Direction, AbstractBristleLaw]] = []
         for side in ("positive", "negative"):
             law = self.law.along(side)
-            assert isinstance(law, (LuGre, Dahl))
+            assert isinstance(law, AbstractBristleLaw)
             sides.append((side, law))
         return sides
 

@@ -26,7 +26,7 @@ def _toward(value: Any, direction: Direction) -> Any:
     return value
 
 
-def _part_toward(part: Any, direction: Direction) -> Any:
+def toward(part: Any, direction: Direction) -> Any:
     """Return a law, or a part of one, without directional values."""
     changes: dict[str, Any] = {}
     for item in dataclasses.fields(part):
@@ -34,9 +34,9 @@ def _part_toward(part: Any, direction: Direction) -> Any:
         if "kind" in item.metadata:
             changes[item.name] = _toward(value, direction)
         elif isinstance(value, tuple):
-            changes[item.name] = tuple(_part_toward(one, direction) for one in value)  # pyright: ignore[reportUnknownVariableType]
+            changes[item.name] = tuple(toward(one, direction) for one in value)  # pyright: ignore[reportUnknownVariableType]
         elif dataclasses.is_dataclass(value):
-            changes[item.name] = _part_toward(value, direction)
+            changes[item.name] = toward(value, direction)
     return dataclasses.replace(part, **changes)
 
 
@@ -92,4 +92,4 @@ class AbstractFrictionLaw(ABC):
 
     def along(self, direction: Direction) -> Self:
         """Return the law of one direction of motion, without directional values."""
-        return _part_toward(self, direction)
+        return toward(self, direction)

@@ -45,7 +45,7 @@ def dump_problem(
         )
     for path in fitted.keys() & values.keys():
         _replace_guess(fitted[path], values[path])
-    _rewrite_recordings(content, source, Path(folder), values)
+    rewrite_recordings(content, source, Path(folder), values)
     if max_step is not None:
         content["estimation"] = {"max_step": max_step} | (content.get("estimation") or {})
     return dump_document(content, document.head)
@@ -100,7 +100,7 @@ def _as_mapping(entry: Any) -> dict[str, Any]:
     return {"file": entry} if isinstance(entry, str) else entry
 
 
-def _rewrite_recordings(content: dict[str, Any], source: Path, folder: Path, values: Mapping[str, float]) -> None:
+def rewrite_recordings(content: dict[str, Any], source: Path, folder: Path, values: Mapping[str, float]) -> None:
     for kind, entries in content["recordings"].items():
         content["recordings"][kind] = [_rewritten(_as_mapping(entry), source, folder, values) for entry in entries]
 

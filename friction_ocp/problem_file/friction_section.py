@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, cast, get_args, get_origin, get_typ
 from pydantic import Field, create_model
 
 from friction_ocp.expressions import closest
+from friction_ocp.friction.composite import Bend, Bristle, StribeckRise, with_added, with_bristle
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.registry import friction_laws
@@ -38,6 +39,47 @@ class PartSection(Section):
         return self.part(**given(self, *type(self).model_fields))
 
 
+class StribeckRiseSection(Section):
+    """Extra friction near standstill."""
+
+    torque: FrictionNumber
+    omega_s: FrictionNumber
+    delta: FrictionNumber = 2.0
+
+
+class BendSection(Section):
+    """A change of the viscous slope."""
+
+    slope: FrictionNumber
+    speed: FrictionNumber
+
+
+class AddedSection(Section):
+    """Terms added to a law."""
+
+    coulomb: FrictionNumber = None
+    viscous: FrictionNumber = None
+    quadratic: FrictionNumber = None
+    stribeck: StribeckRiseSection | None = None
+    bend: BendSection | None = None
+
+    def build(self) -> dict[str, Any]:
+        """Return the terms by name."""
+        terms = dict(given(self, "coulomb", "viscous", "quadratic"))
+        if self.stribeck is not None:
+            terms["stribeck"] = StribeckRise(**given(self.stribeck, *StribeckRiseSection.model_fields))
+        if self.bend is not None:
+            terms["bend"] = Bend(self.bend.slope, self.bend.speed)
+        return terms
+
+
+class BristleSection(Section):
+    """Elastic contact under a static law."""
+
+    sigma0: FrictionNumber
+    sigma1: FrictionNumber = 0.0
+
+
 class FrictionSection(Section):
     """What every law has beside its own numbers."""
 
@@ -45,12 +87,18 @@ class FrictionSection(Section):
     load: LoadSection | None = None
     ripple: RippleTerm = None
     warm_up: WarmUpTerm = None
+    added: AddedSection | None = None
+    bristle: BristleSection | None = None
 
     def build(self, law: type[AbstractFrictionLaw]) -> FrictionElement:
         numbers = given(self, *(name for name in self.keys() if name not in FrictionSection.model_fields))
-        built = {name: _built(value) for name, value in numbers.items()}
+        whole: AbstractFrictionLaw = law(**{name: _built(value) for name, value in numbers.items()})
+        if self.added is not None:
+            whole = with_added(whole, **self.added.build())
+        if self.bristle is not None and not law.has_bristle:
+            whole = with_bristle(whole, Bristle(self.bristle.sigma0, self.bristle.sigma1))
         load = None if self.load is None else self.load.build()
-        return FrictionElement(law(**built), load, self.ripple, self.warm_up)
+        return FrictionElement(whole, load, self.ripple, self.warm_up)
 
 
 def read_friction(value: Any) -> FrictionElement:

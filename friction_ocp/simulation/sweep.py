@@ -26,12 +26,14 @@ STEPS_WORTH_A_THREAD = 1500
 class Sweep:
     """The one-step functions of a drive, looped over grids."""
 
-    def __init__(self, drive: SteppedDrive, active: Sequence[int]) -> None:
+    def __init__(self, drive: SteppedDrive, active: Sequence[int], values_only: bool = False) -> None:
         self.drive = drive
         self.active = tuple(active)
         self.start = _start_with_slope(drive, self.active)
         """(y, dy, u, p) -> start state and its derivative by the active numbers."""
-        self.kernel: AbstractKernel = compile_sweep(drive, self.active) or InterpretedKernel(drive, self.active)
+        self.kernel: AbstractKernel = compile_sweep(drive, self.active, values_only) or InterpretedKernel(
+            drive, self.active
+        )
 
     def run(
         self,

@@ -1,0 +1,102 @@
+"""Sizes and motions from a fitted base model, for the initial guesses of effects."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
+from friction_ocp.drive.coordinates import group_angles, group_speeds
+from friction_ocp.drive.mechanism import Mechanism, Motion, column
+from friction_ocp.drive.motors import motor_torque
+from friction_ocp.effects.effect import Clues, Track
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+
+def clues_of(fitted: FittedModel) -> Clues:
+    """Return what the fitted model says about motions and torques."""
+    mech = fitted.model.drive.mechanism
+    watch, names = _watch(mech)
+    tracks = tuple(_track(fitted, index, watch, names) for index in range(len(fitted.linear.recordings)))
+    first = fitted.model.train[0].name
+    numbers = fitted.model.space.numbers(fitted.theta, first)
+    by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
+    return Clues(tracks, by_path, _typical_torques(fitted, tracks, by_path))
+
+
+def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
+    """Return (x, u, p) -> motions of all shafts and torques of all motors, and their names."""
+    sizes = (len(mech.angle_groups), len(mech.free_groups), len(mech.bristles), len(mech.extra_names))
+    x = [ca.SX.sym(f"x{k}", size) for k, size in enumerate((*sizes, len(mech.memory_names)))]
+    q, v = group_angles(mech, x[0]), group_speeds(mech, x[1])
+    at = Motion(q, v, x[3], x[4])
+    shafts, motors = mech.drive.shafts, mech.drive.motors
+    values = [mech.shaft_angle(shaft.name, at) for shaft in shafts]
+    values += [mech.shaft_speed(shaft.name, v) for shaft in shafts]
+    values += [motor_torque(mech, motor, at) for motor in motors]
+    names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
+    names += [f"{motor.name}.torque" for motor in motors]
+    u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
+    return ca.Function("watch", [ca.vertcat(*x), u, p], [column(values)]), names
+
+
+def states_along(fitted: FittedModel, index: int) -> FloatArray:
+    """Return (n, states) of a recording as the fitted model passes through it."""
+    result = fitted.linear.program.simulate(index, fitted.linear.point, with_states=True)
+    assert result.states is not None
+    return result.states
+
+
+def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]) -> Track:
+    item = fitted.linear.program.experiments[index]
+    numbers = fitted.model.space.numbers(fitted.theta, item.name)
+    states = states_along(fitted, index)
+    seen = np.asarray(watch.map(item.grid.time.size)(states.T, item.grid.at_node.T, numbers))
+    table = {name: seen[k] for k, name in enumerate(names)}
+    mech = fitted.model.drive.mechanism
+
+    def of(kind: str) -> dict[str, FloatArray]:
+        return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in mech.drive.shafts}
+
+    torque = {motor.name: table[f"{motor.name}.torque"] for motor in mech.drive.motors}
+    middle, missing = _missing(fitted, index)
+    return Track(item.grid.time, of("theta"), of("omega"), torque, middle, missing)
+
+
+def _missing(fitted: FittedModel, index: int) -> tuple[IntArray, dict[str, FloatArray]]:
+    """Return the middle samples of segments and the mean torque that would close the gap behind each, by shaft."""
+    item, mech = fitted.linear.recordings[index], fitted.model.drive.mechanism
+    first = item.cut.first
+    middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
+    numbers = fitted.footing.numbers[item.item.name]
+    inertias = group_inertias(mech, {**numbers, **fitted.values})
+    spans = np.diff(item.item.grid.time[first])[:-1]
+    missing: dict[str, FloatArray] = {}
+    for shaft in mech.drive.shafts:
+        group = mech.topology.group_of[shaft.name]
+        torque = np.zeros(middle.size)
+        if group in mech.free_groups and middle.size:
+            at = len(mech.angle_groups) + mech.free_groups.index(group)
+            jump = item.nodes[1:, at] - item.end[:-1, at]
+            ratio = speed_ratio(fitted.model, fitted.footing, item.item.name, shaft.name)
+            torque = float(inertias[group]) * jump / spans / ratio
+        missing[shaft.name] = torque
+    return middle, missing
+
+
+def _typical_torques(fitted: FittedModel, tracks: tuple[Track, ...], numbers: dict[str, float]) -> dict[str, float]:
+    """Return the rms of motor torques, carried through the ratios to every shaft; 1 where there is no motor."""
+    drive = fitted.model.problem.drive
+    found: dict[str, float] = {}
+    for motor in drive.motors:
+        values = np.concatenate([track.torque[motor.name] for track in tracks])
+        found[motor.shaft] = max(float(np.sqrt(np.mean(values**2))), 1e-12)
+    for _ in drive.transmissions:
+        for item in drive.transmissions:
+            ratio = abs(numbers.get(f"{item.from_shaft}-{item.to_shaft}.ratio", 1.0))
+            if item.from_shaft in found and item.to_shaft not in found:
+                found[item.to_shaft] = found[item.from_shaft] * ratio
+            elif item.to_shaft in found and item.from_shaft not in found:
+                found[item.from_shaft] = found[item.to_shaft] / ratio
+    return {shaft.name: found.get(shaft.name, 1.0) for shaft in drive.shafts}

@@ -1,0 +1,196 @@
+"""Diagnosis on one page: base fit -> gap -> candidates -> choice, one addition a round -> how far."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.excess import Excess, excess
+from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out, refit
+from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
+from friction_ocp.diagnosis.screen import Screened, screen
+from friction_ocp.diagnosis.select import Choice, Rival, choose
+from friction_ocp.effects.registry import candidates, effects
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.problem import Problem
+
+SIGNIFICANCE = 0.01
+MOST_ROUNDS = 4
+REFITTED = 6
+"""Candidates that are refitted in a round."""
+WORTH_REFITTING = 0.1
+"""Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
+MATERIAL = 0.1
+"""Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
+
+Tell = Callable[[str, float], None]
+"""Called with what is being done and the share of a round that is done."""
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Round:
+    """One decision: which addition, if any."""
+
+    screened: tuple[Screened, ...]
+    """All candidates, largest predicted gain first."""
+    choice: Choice
+    before: FittedModel
+    excess: Excess
+    accepted: Rival | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer of a diagnosis."""
+
+    problem: Problem
+    base: FittedModel
+    final: FittedModel
+    rounds: tuple[Round, ...]
+    accepted: tuple[Key, ...]
+    level: float
+    before: FreeErrors
+    after: FreeErrors
+    remainder: Excess
+    seconds: float
+
+    @property
+    def gap(self) -> bool:
+        """Whether the base model lacks something."""
+        return bool(self.accepted) or self.rounds[0].excess.significant(self.level)
+
+    @property
+    def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
+        """Sets of candidates that the recordings cannot tell apart."""
+        sets = [tuple(rival.key for rival in item.choice.aliases) for item in self.rounds if item.accepted is not None]
+        return tuple(keys for keys in sets if len(keys) > 1)
+
+    @property
+    def verdict(self) -> str:
+        """explained, no_gap, unknown_effect or undecided."""
+        if not self.gap:
+            return "no_gap"
+        if self.remainder.significant(self.level):
+            return "unknown_effect"
+        return "undecided" if self.alias_sets else "explained"
+
+
+def diagnose(problem: Problem, tell: Tell = lambda what, share: None) -> Diagnosis:
+    """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive."""
+    began = time.perf_counter()
+    level, names = _options(problem)
+    tell("base model", 0.0)
+    base = fit_base(prepare(problem))
+    rng = np.random.default_rng(problem.estimation.seed)
+    current, rounds, accepted = base, list[Round](), list[Key]()
+    for number in range(MOST_ROUNDS):
+        done = _round(current, names, level, rng, lambda what, share, n=number: tell(f"round {n + 1}: {what}", share))
+        rounds.append(done)
+        if done.accepted is None:
+            break
+        current = done.accepted.fitted
+        accepted.append(done.accepted.key)
+    rows = current.linear.rows
+    return Diagnosis(
+        problem=problem,
+        base=base,
+        final=current,
+        rounds=tuple(rounds),
+        accepted=tuple(accepted),
+        level=level,
+        before=free_errors(base, held_out=True),
+        after=free_errors(current, held_out=True),
+        remainder=excess(rows, blocks_of(rows)),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _options(problem: Problem) -> tuple[float, list[str]]:
+    """Return the level of significance and the names of the effects to consider."""
+    known = list(effects())
+    where = f"{problem.path or problem.title}: diagnosis"
+    stated: Mapping[str, Any] = problem.diagnosis
+    wanted: Any = stated.get("effects") or known
+    left_out: Any = stated.get("exclude") or []
+    findings: list[Finding] = []
+    for key, names in (("effects", wanted), ("exclude", left_out)):
+        if not isinstance(names, list):
+            findings.append(Finding(f"{where}.{key}", f"this is {names!r}", "a list of effects"))
+            continue
+        for name in cast(list[Any], names):
+            if name not in known:
+                available = f"available: {', '.join(known)}"
+                findings.append(Finding(f"{where}.{key}", f"unknown effect {name!r}", available))
+    level = stated.get("significance", SIGNIFICANCE)
+    if not isinstance(level, (int, float)) or not 0.0 < level < 0.5:
+        findings.append(Finding(f"{where}.significance", f"this is {level!r}", "a number between 0 and 0.5"))
+    if findings:
+        raise FrictionOcpError(findings)
+    return float(level), [str(name) for name in wanted if name not in left_out]
+
+
+def _round(current: FittedModel, names: list[str], level: float, rng: np.random.Generator, tell: Tell) -> Round:
+    rows = current.linear.rows
+    blocks, clues = blocks_of(rows), clues_of(current)
+    entries = list(candidates(current.model.problem.drive, names))
+    found: list[Screened] = []
+    for k, (effect, place) in enumerate(entries):
+        tell(f"{effect.name} at {place}", 0.5 * k / len(entries))
+        seen = screen(current.model, current.linear, blocks, effect, place, clues)
+        found += [] if seen is None else [seen]
+    found.sort(key=lambda item: -item.gain)
+    shortlist = _shortlist(found, level)
+    rivals = _rivals(current, shortlist, blocks, tell)
+    choice = choose(rivals, blocks, level, rng)
+    power = excess(rows, blocks)
+    accepted = choice.rivals[0] if choice.significant and _is_material(current, choice.rivals[0].fitted) else None
+    return Round(tuple(found), choice, current, power, accepted)
+
+
+def _shortlist(found: Sequence[Screened], level: float) -> list[Screened]:
+    """Return candidates that are significant after correction for their number (Bonferroni), and worth a refit."""
+    significant = [item for item in found if item.p_value * len(found) < level and item.gain > 0]
+    if not significant:
+        return []
+    return [item for item in significant if item.gain >= WORTH_REFITTING * significant[0].gain][:REFITTED]
+
+
+def _rivals(current: FittedModel, shortlist: Sequence[Screened], blocks: Blocks, tell: Tell) -> list[Rival]:
+    if not shortlist:
+        return []
+    without = blocks.sums(held_out(current))
+    rivals: list[Rival] = []
+    for k, item in enumerate(shortlist):
+        tell(f"refit with {item.effect} at {item.component}", 0.5 + 0.5 * k / len(shortlist))
+        fitted = refit(current, item.augmentation.drive, item.values)
+        rivals.append(Rival(item, fitted, without - blocks_like(current, fitted, blocks)))
+    return rivals
+
+
+def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> np.ndarray:
+    """Return (blocks,) held-out costs of a refitted candidate over the blocks of the model without it."""
+    rows, reference = fitted.linear.rows, current.linear.rows
+    costs = held_out(fitted)
+    totals = np.zeros(blocks.count)
+    for recording in np.unique(blocks.recording):
+        own = (reference.recording == recording) & (blocks.of_row >= 0)
+        numbers, starts = blocks.of_row[own], reference.time[own]
+        mine = rows.recording == recording
+        order = np.argsort(starts, kind="stable")
+        at = np.clip(np.searchsorted(starts[order], rows.time[mine], side="right") - 1, 0, order.size - 1)
+        np.add.at(totals, numbers[order][at], costs[mine])
+    return totals
+
+
+def _is_material(current: FittedModel, fitted: FittedModel) -> bool:
+    """Whether an addition takes away more of the free-run error than the floors are in doubt by."""
+    before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
+    return bool(before.excess() - after.excess() > MATERIAL * (1.0 + after.excess()))

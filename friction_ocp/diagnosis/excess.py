@@ -1,0 +1,41 @@
+"""Is there a gap: the power of the innovations over the noise floor, in blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.diagnosis.blocks import Blocks, stats
+from friction_ocp.diagnosis.linear import Rows
+
+FLOOR_DOUBT = 0.05
+"""Relative doubt about any noise floor: an error that is this much above it may be the floor's own."""
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Mean square of the innovations over their variance."""
+
+    ratio: float
+    p_value: float
+    """Probability of so much power where there is nothing but noise, the floor being off by its doubt."""
+
+    def significant(self, level: float) -> bool:
+        """Whether there is more than noise at a level."""
+        return self.p_value < level
+
+
+def excess(rows: Rows, blocks: Blocks) -> Excess:
+    """Test whether the mean power of the blocks exceeds what noise gives (one-sided t test over blocks)."""
+    samples = (rows.channel >= 0) & (rows.residual != 0.0)
+    power, count = blocks.sums(rows.residual**2), blocks.sums(samples.astype(float))
+    told = count > 0
+    ratios = power[told] / count[told]
+    mean = float(np.sum(power) / max(float(np.sum(count)), 1.0))
+    if ratios.size < 2:
+        return Excess(mean, 1.0)
+    spread = float(np.std(ratios, ddof=1)) / np.sqrt(ratios.size)
+    limit = (1.0 + FLOOR_DOUBT) ** 2
+    statistic = (float(np.mean(ratios)) - limit) / max(spread, 1e-300)
+    return Excess(mean, float(stats.t.sf(statistic, ratios.size - 1)))

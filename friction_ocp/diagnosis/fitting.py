@@ -1,0 +1,148 @@
+"""Fits of the models that compete: the base model from its guesses, a candidate from the base model's answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friction_ocp.diagnosis.contrast import contrast
+from friction_ocp.diagnosis.footing import Footing, footing
+from friction_ocp.diagnosis.linear import LinearProgram, linear_program
+from friction_ocp.drive.parts import Drive
+from friction_ocp.estimation.fit import fit
+from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.estimation.stages import WIDTHS, predictions, relaxed
+from friction_ocp.simulation.grid import FloatArray
+
+COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
+WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
+STEPS_FROM_HELD_OUT = 3
+SHRINK = 0.01
+"""Share of the information of a left-out recording that is kept: where nothing else informs, a step stays small."""
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A model at its best parameters on a footing."""
+
+    model: Model
+    footing: Footing
+    linear: LinearProgram
+
+    @property
+    def theta(self) -> FloatArray:
+        """(parameters,)."""
+        return self.linear.point.theta
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values by name."""
+        return dict(zip(self.model.space.names, map(float, self.theta), strict=True))
+
+    @property
+    def objective(self) -> float:
+        """Half the sum of squares."""
+        return 0.5 * float(np.sum(self.linear.rows.residual**2))
+
+
+def fit_base(model: Model) -> FittedModel:
+    """Fit the base model from its guesses and lay the footing on which all models are compared."""
+    rough = footing(model, model.space.guess)
+    if rough.segment_s is None:
+        theta = fit(model).solution.point.theta
+        return polished(model, footing(model, theta), theta, None)
+    program, end = _rough_answer(model)
+    foot = footing(model, end.theta)
+    exact = foot.program(model, program.experiments)
+    nodes = exact.point_along(program, end).nodes
+    return polished(model, foot, end.theta, nodes if foot.train is program.experiments else None)
+
+
+def _rough_answer(model: Model) -> tuple[Program, Point]:
+    """Fit on loosely joined segments, from the guesses and from short predictions."""
+    short = predictions(model, model.train, WIDTHS[0])
+    start = Point(model.space.guess, short.suggested_nodes(model.space.guess))
+    starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
+    program = relaxed(model, model.train, 0.0, Squares())
+    ends = [solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE) for theta in starts]
+    return program, min(ends, key=lambda end: end.objective).point
+
+
+def polished(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:
+    """Minimise the likelihood on the footing from a start."""
+    program = foot.training(model)
+    theta = model.space.clip(theta)
+    point = Point(theta, program.suggested_nodes(theta) if nodes is None else nodes)
+    if nodes is None:
+        point = solve_nodes(program, point)
+    end = solve_gauss_newton(program, point, WARM).point if theta.size else solve_nodes(program, point)
+    return FittedModel(model, foot, linear_program(program, end))
+
+
+def refit(base: FittedModel, drive: Drive, values: Mapping[str, float]) -> FittedModel:
+    """Fit a candidate drive from the base model's answer and the predicted values of what was added."""
+    model = with_drive(base.model, drive)
+    built = contrast(base.model, base.linear, drive)
+    wanted = built.theta(values)
+    by_name = dict(zip(built.space.names, wanted, strict=True))
+    theta = np.array([by_name[name] for name in model.space.names])
+    theta = model.space.clip(theta)
+    known = {name: value for name, value in zip(model.space.names, theta, strict=True)}
+    at = np.array([known[name] for name in built.space.names])
+    nodes = tuple(built.simulate(k, item, at)[2] for k, item in enumerate(base.linear.recordings))
+    if not all(np.all(np.isfinite(item)) for item in nodes):
+        return polished(model, base.footing, theta, None)
+    return polished(model, base.footing, theta, nodes)
+
+
+def held_out(fitted: FittedModel) -> FloatArray:
+    """Return (rows,) costs of every recording under parameters that it took no part in.
+
+    The parameters without a recording are one Gauss-Newton step from those with all of them; its states are its own.
+    """
+    rows, count = fitted.linear.rows, len(fitted.linear.recordings)
+    prior = rows.jacobian[rows.recording < 0]
+    hessians = [item.jacobian.T @ item.jacobian for item in fitted.linear.recordings]
+    gradients = [item.jacobian.T @ item.residual for item in fitted.linear.recordings]
+    costs: list[FloatArray] = []
+    for k, item in enumerate(fitted.linear.recordings):
+        rest = sum((hessians[j] for j in range(count) if j != k), prior.T @ prior) + SHRINK * hessians[k]
+        theta = fitted.model.space.clip(fitted.theta + _solve(rest, gradients[k]))
+        program = _only(fitted.linear.program, k)
+        nodes = item.nodes + item.moved_by(theta - fitted.theta)
+        point = solve_nodes(program, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT)
+        costs.append(raw_costs(program, point))
+    return np.concatenate([*costs, np.zeros(rows.residual.size - sum(cost.size for cost in costs))])
+
+
+def _only(program: Program, index: int) -> Program:
+    return replace(program, experiments=(program.experiments[index],), segments=(program.segments[index],))
+
+
+def raw_costs(program: Program, point: Point) -> FloatArray:
+    """Return (rows,) half the squares of all residuals of a program of one recording, in the order of `Rows`."""
+    result = program.simulate(0, point)
+    item, cut, nodes = program.experiments[0], program.segments[0], point.nodes[0]
+    errors = np.where(np.isfinite(item.measured), program.residuals(0, result.y), 0.0)
+    parts = [errors.ravel()]
+    if cut.gap_weight is not None and cut.count > 1:
+        parts.append(np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:]).ravel())
+    if cut.start_weight is not None:
+        suggested, _ = program.measured_states(item, point.theta, cut.first[cut.tied])
+        parts.append((cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel())
+    return 0.5 * np.concatenate(parts) ** 2
+
+
+def _solve(hessian: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Solve with directions left alone that the other recordings say nothing about."""
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    told = values > 1e-8
+    along = vectors.T @ (gradient / scale)
+    return (vectors[:, told] @ (along[told] / values[told])) / scale

@@ -1,0 +1,313 @@
+"""What stays the same while models compete: noise of channels and inputs, and how recordings are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
+
+from friction_ocp.drive.mechanism import Mechanism
+from friction_ocp.drive.parts import Channel, Motor
+from friction_ocp.estimation.experiment import Experiment, with_inputs
+from friction_ocp.estimation.horizon import is_held
+from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.model import Model, standstill_slope, typical_inputs
+from friction_ocp.estimation.noise import noise_floor
+from friction_ocp.estimation.program import Program, Segments
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+linalg: Any = _linalg  # its own types are incomplete
+
+FOLDS = 4
+"""Pieces of a single training recording, to leave out one at a time."""
+SHORTEST, LONGEST = 5, 50
+"""Samples in a segment."""
+MOST_SEGMENTS = 400
+"""In one recording; more would cost time and tell no more."""
+NUMERICAL_INPUT = 1e-3
+"""Error of a measured input over its rms, sample by sample, that a simulation between samples makes anyway."""
+SMOOTH = 4.0 * np.sqrt(6.0)
+"""Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
+NEGLIGIBLE_GAP = 0.1
+"""Gap over the noise floor that stands for a state that no noise enters."""
+
+
+@dataclass(frozen=True)
+class Footing:
+    """Noise and cuts, from the recordings and the base model, the same for every model that is compared."""
+
+    density: Mapping[str, float]
+    """Torque noise by shaft, N m/sqrt(Hz): what is stated, and what noise of the measured inputs makes."""
+    numbers: Mapping[str, Mapping[str, float]]
+    """By recording: the numbers of the base model, with which noise of torque becomes noise of motion."""
+    segment_s: float | None
+    """Length of the segments; None is the free run over whole recordings."""
+    noise: FloatArray
+    """(outputs,) noise floors with what torque noise adds within a segment."""
+    train: tuple[Experiment, ...]
+    """Training recordings, or pieces of the only one, with the inputs of the base model."""
+    inputs: tuple[str, ...]
+    """Names of the inputs of the base model."""
+
+    def program(self, model: Model, experiments: tuple[Experiment, ...]) -> Program:
+        """Return the likelihood of some recordings under a model, as a least-squares program."""
+        segments = tuple(self._segments(model, item) for item in experiments)
+        width = 0.0 * model.speed_scale
+        return Program(model.space, model.drive, model.sweep, experiments, segments, self.noise, width, Squares())
+
+    def training(self, model: Model) -> Program:
+        """Return the likelihood of the training recordings; the grids are those of the model."""
+        return self.program(model, tuple(self._regridded(item, model) for item in self.train))
+
+    def _regridded(self, item: Experiment, model: Model) -> Experiment:
+        substeps = np.maximum(1, np.ceil(item.grid.dt / model.max_step - 1e-9)).astype(np.int64)
+        item = replace(item, grid=replace(item.grid, substeps=substeps))
+        recording = next(use.recording for use in model.problem.recordings if use.name == item.name)
+        return with_inputs(item, self.inputs, model.drive.input_names, recording)
+
+    def _segments(self, model: Model, item: Experiment) -> Segments:
+        impulses = {} if self.segment_s is None else input_impulses(model, item, self.numbers[item.name])
+        first = cuts(item, self.segment_s)
+        if impulses:
+            total = sum(np.square(values) for values in impulses.values())
+            first = with_cuts(first, np.asarray(total))
+        start = np.zeros((len(first) - 1, model.state_scale.size))
+        start[0] = 1.0 / model.state_scale
+        weights = gap_roots(model, self, item, first, impulses)
+        if model.problem.estimation.initial_state == "measured":
+            return Segments(first, weights, measured=1)
+        return Segments(first, weights, start_weight=start)
+
+
+def cuts(item: Experiment, seconds: float | None) -> IntArray:
+    """Return the first nodes of segments of about `seconds`, the last node behind them."""
+    time = item.grid.time
+    if seconds is None:
+        return np.array([0, time.size - 1], dtype=np.int64)
+    count = int(np.clip(round((time[-1] - time[0]) / seconds), 1, MOST_SEGMENTS))
+    edges: FloatArray = np.linspace(float(time[0]), float(time[-1]), count + 1)
+    return np.unique(np.clip(np.searchsorted(time, edges - 1e-9), 0, time.size - 1)).astype(np.int64)
+
+
+def pieces(item: Experiment, count: int) -> list[Experiment]:
+    """Cut a recording into pieces that begin afresh; they keep its name."""
+    edges = [round(edge) for edge in np.linspace(0, item.grid.time.size - 1, count + 1).tolist()]
+    found: list[Experiment] = []
+    for begin, end in pairwise(edges):
+        at = slice(begin, end + 1)
+        grid = replace(item.grid, **{key: value[at] for key, value in vars(item.grid).items()})
+        found.append(replace(item, grid=grid, measured=item.measured[at], smooth=item.smooth[at], rate=item.rate[at]))
+    return found
+
+
+def footing(model: Model, theta: FloatArray) -> Footing:
+    """Return the common footing of all models, from the base model at `theta`."""
+    first = model.train[0]
+    train = model.train if len(model.train) > 1 else tuple(pieces(first, FOLDS))
+    numbers = {
+        use.name: dict(zip(model.space.leaf_names, model.space.numbers(theta, use.name), strict=True))
+        for use in model.problem.recordings
+    }
+    density = torque_noise(model, numbers[first.name])
+    if is_held(model.problem.drive) and not any(density.values()):
+        return Footing(density, numbers, None, model.noise, train, model.drive.input_names)
+    bare = Footing(density, numbers, None, model.noise, train, model.drive.input_names)
+    seconds = _segment_length(model, bare, first)
+    inflated = np.sqrt(model.noise**2 + _within(model, bare, first, seconds))
+    return Footing(density, numbers, seconds, inflated, train, model.drive.input_names)
+
+
+def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the density of torque noise by shaft, N m/sqrt(Hz): stated, and from the noise of measured inputs."""
+    power = {shaft: density**2 for shaft, density in model.problem.estimation.process_noise.items()}
+    for motor in model.problem.drive.motors:
+        for channel in model.problem.drive.inputs:
+            factor = _torque_factor(motor, channel, numbers)
+            if factor is None:
+                continue
+            std, step = _input_noise(model, channel)
+            power[motor.shaft] = power.get(motor.shaft, 0.0) + (factor * std) ** 2 * step
+    return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
+
+
+def _torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float]) -> float | None:
+    """Return the torque of a motor per unit of an input channel; None where the channel does not drive it."""
+    constant = numbers.get(f"{motor.name}.torque_constant", 1.0)
+    factors = {"torque": 1.0, "current": constant, "current_command": constant}
+    factors["voltage"] = constant / max(numbers.get(f"{motor.name}.resistance", 1.0), 1e-300)
+    return factors.get(channel.signal) if channel.part == motor.name else None
+
+
+def _input_noise(model: Model, channel: Channel) -> tuple[float, float]:
+    """Return the noise floor of an input and its sampling interval."""
+    signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
+    step = float(np.median(np.diff(signals[0].time)))
+    size = max(float(np.sqrt(np.nanmean(item.values**2))) for item in signals)
+    floor = noise_floor(channel, [(item.time, item.values) for item in signals]).std
+    return max(floor, NUMERICAL_INPUT * size), step
+
+
+def group_inertias(mech: Mechanism, numbers: Mapping[str, float]) -> FloatArray:
+    """Return the inertia of every group at given numbers."""
+    inertias = ca.vertcat(*[ca.SX(mech.inertia(g)) for g in range(len(mech.topology.roots))])
+    function = ca.Function("inertia", list(mech.parameters.values()), [inertias])
+    return np.asarray(function(*(numbers.get(name, 1.0) for name in mech.parameters))).ravel()
+
+
+def speed_ratio(model: Model, foot: Footing, recording: str, shaft: str) -> float:
+    """Return the speed of a shaft over that of its group's first shaft."""
+    ratio = model.drive.mechanism.topology.speed_ratio[shaft]
+    if not isinstance(ratio, ca.SX):
+        return float(ratio)
+    mech, numbers = model.drive.mechanism, foot.numbers[recording]
+    function = ca.Function("ratio", list(mech.parameters.values()), [ratio])
+    return float(function(*(numbers.get(name, 1.0) for name in mech.parameters)))
+
+
+def group_density(model: Model, foot: Footing, recording: str) -> FloatArray:
+    """Return the density of the acceleration noise of every group, rad/s^2/sqrt(Hz)."""
+    mech = model.drive.mechanism
+    numbers = _known_numbers(model, foot, recording)
+    power = [ca.SX(0.0) for _ in mech.topology.roots]
+    for shaft, density in foot.density.items():
+        power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
+    function = ca.Function("power", list(mech.parameters.values()), [ca.vertcat(*power)])
+    values = np.asarray(function(*(numbers.get(name, 1.0) for name in mech.parameters))).ravel()
+    return np.sqrt(values) / np.maximum(group_inertias(mech, numbers), 1e-300)
+
+
+def unit_covariances(model: Model, foot: Footing, recording: str, spans: FloatArray) -> FloatArray:
+    """Return (groups, spans, states, states) what unit acceleration noise of each group gathers over each span, s.
+
+    About standstill and without dry friction: dP/dt = A P + P A' + noise. Source: Van Loan 1978.
+    """
+    mech = model.drive.mechanism
+    numbers = _known_numbers(model, foot, recording)
+    values = np.array([numbers[name] for name in model.space.leaf_names])
+    slope = standstill_slope(model.drive, values, typical_inputs(model.problem, model.drive))
+    states = slope.shape[0]
+    found = np.zeros((len(mech.topology.roots), spans.size, states, states))
+    for k, group in enumerate(mech.free_groups):
+        power = np.zeros((states, states))
+        power[len(mech.angle_groups) + k, len(mech.angle_groups) + k] = 1.0
+        whole = np.block([[-slope, power], [np.zeros_like(slope), slope.T]])
+        for j, span in enumerate(spans):
+            wide = linalg.expm(whole * span)
+            found[group, j] = wide[states:, states:].T @ wide[:states, states:]
+    return 0.5 * (found + found.swapaxes(2, 3))
+
+
+def gap_roots(
+    model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
+
+    Torque noise makes the states wander, more so where an input jumps between two samples; states that no noise
+    enters may jump by a share of the noise floor.
+    """
+    spans = np.diff(item.grid.time[first])
+    still = still_gaps(model, foot, item.name, float(np.median(spans)))
+    if spans.size < 2:
+        return np.zeros((0, still.size, still.size))
+    distinct, which = np.unique(np.round(spans, 9), return_inverse=True)
+    units = unit_covariances(model, foot, item.name, distinct)
+    power = group_density(model, foot, item.name)[:, None] ** 2 + _jump_power(model, foot, item, first, impulses)
+    covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
+
+
+def _jump_power(
+    model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return (groups, segments) the power density of acceleration that jumps of inputs may hide."""
+    spans = np.diff(item.grid.time[first])
+    mech = model.drive.mechanism
+    inertias = group_inertias(mech, _known_numbers(model, foot, item.name))
+    power = np.zeros((len(inertias), spans.size))
+    for shaft, values in impulses.items():
+        group = mech.topology.group_of[shaft]
+        ratio = speed_ratio(model, foot, item.name, shaft) / max(float(inertias[group]), 1e-300)
+        power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
+    return power
+
+
+def _known_numbers(model: Model, foot: Footing, recording: str) -> dict[str, float]:
+    numbers = dict(zip(model.space.leaf_names, model.space.numbers(model.space.guess, recording), strict=True))
+    return {**numbers, **foot.numbers[recording]}
+
+
+def input_impulses(model: Model, item: Experiment, numbers: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Return by shaft (n,) N m s: how far the torque of each interval may be off because an input jumps inside it.
+
+    A jump at an unknown instant between two samples that are joined by a line leaves its size times the interval
+    over sqrt(12); what bends less than noise would bend counts as smooth.
+    """
+    drive = model.problem.drive
+    found: dict[str, FloatArray] = {}
+    for motor in drive.motors:
+        for channel in drive.inputs:
+            factor = _torque_factor(motor, channel, numbers)
+            if factor is None or channel.hold == "zero":
+                continue
+            column = model.drive.input_names.index(channel.name)
+            bend = np.abs(np.diff(item.grid.at_node[:, column], 2, prepend=np.nan, append=np.nan))
+            std, _ = _input_noise(model, channel)
+            jump = np.fmax(bend, np.append(bend[1:], np.nan))
+            jump = np.where(jump > SMOOTH * std, np.nan_to_num(jump), 0.0)
+            impulse = factor * jump * item.grid.dt / np.sqrt(12.0)
+            found[motor.shaft] = np.hypot(found.get(motor.shaft, 0.0), impulse)
+    return found
+
+
+def with_cuts(first: IntArray, power: FloatArray) -> IntArray:
+    """Add cuts around the intervals whose torque is most in doubt, so that nothing else bears it."""
+    largest = np.argsort(power)[::-1][: MOST_SEGMENTS // 2]
+    doubtful = largest[power[largest] > 0]
+    return np.unique(np.concatenate([first, doubtful, doubtful + 1]).clip(0, first[-1])).astype(np.int64)
+
+
+def still_gaps(model: Model, foot: Footing, recording: str, span: float) -> FloatArray:
+    """Return (states,) how far states may jump that no noise enters: less than the channels can see."""
+    mech = model.drive.mechanism
+    size = 1e-5 * model.state_scale
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part)
+        if group is None or channel.signal not in ("theta", "omega"):
+            continue
+        ratio = abs(speed_ratio(model, foot, recording, channel.part))
+        floor = NEGLIGIBLE_GAP * float(model.noise[k]) / max(ratio, 1e-300)
+        names = {f"{mech.topology.roots[group]}.theta": floor, f"{mech.topology.roots[group]}.omega": floor / span}
+        for state, limit in names.items():
+            if state in model.drive.state_names:
+                at = model.drive.state_names.index(state)
+                size[at] = min(size[at], limit)
+    return np.maximum(size, 1e-12 * model.state_scale)
+
+
+def _segment_length(model: Model, foot: Footing, item: Experiment) -> float:
+    """Return the longest segments, s, in which torque noise moves no channel by more than its noise floor."""
+    step = float(np.median(np.diff(item.grid.time)))
+    lengths = np.unique(np.geomspace(SHORTEST, LONGEST, 12).round()) * step
+    fitting = [length for length in lengths if np.all(_within(model, foot, item, float(length)) <= model.noise**2)]
+    return float(max(fitting, default=lengths[0]))
+
+
+def _within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
+    """Return (outputs,) the mean variance that torque noise adds between the start and end of a segment."""
+    mech = model.drive.mechanism
+    units = unit_covariances(model, foot, item.name, seconds * np.array([0.25, 0.5, 0.75, 1.0]))
+    covariances: FloatArray = np.einsum("g,gsij->sij", group_density(model, foot, item.name) ** 2, units)
+    added = np.zeros(len(mech.drive.outputs))
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part)
+        name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
+        if name in model.drive.state_names:
+            at = model.drive.state_names.index(name)
+            ratio = speed_ratio(model, foot, item.name, channel.part)
+            added[k] = ratio**2 * float(np.mean(covariances[:, at, at]))
+    return added

@@ -1,0 +1,111 @@
+"""How far: the gap of free runs before and after, in units, in noise floors and by regime."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.regimes import REGIMES, regimes
+from friction_ocp.estimation.score import FreeRun, simulate_recordings
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+
+BLOCKS = 24
+RESAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class FreeErrors:
+    """Squared errors of free runs over their noise floors, in blocks of time."""
+
+    runs: tuple[FreeRun, ...]
+    channels: tuple[str, ...]
+    floors: FloatArray
+    """(channels,)."""
+    power: FloatArray
+    """(blocks, channels) sum of squared errors over the squared floor."""
+    count: FloatArray
+    """(blocks, channels) samples."""
+
+    def ratios(self, weight: FloatArray | None = None) -> FloatArray:
+        """Return (channels,) mean square error over the squared floor, blocks weighted."""
+        drawn = np.ones(len(self.power)) if weight is None else weight
+        return (drawn @ self.power) / np.maximum(drawn @ self.count, 1e-300)
+
+    def excess(self, weight: FloatArray | None = None) -> float:
+        """Return E, the mean over channels of max(0, rms^2 / floor^2 - 1)."""
+        return float(np.mean(np.maximum(self.ratios(weight) - 1.0, 0.0)))
+
+
+def free_errors(fitted: FittedModel, held_out: bool) -> FreeErrors:
+    """Simulate validation recordings (`held_out`, where there are any) or training recordings freely."""
+    model = fitted.model
+    items = model.validation if held_out and model.validation else model.train
+    runs = simulate_recordings(model, items, fitted.theta)
+    floors = model.noise
+    power: list[FloatArray] = []
+    count: list[FloatArray] = []
+    for run in runs:
+        scaled = ((run.simulated - run.measured) / floors) ** 2
+        seen = np.isfinite(scaled)
+        edges = np.linspace(0, run.time.size, BLOCKS + 1).astype(int)[:-1]
+        power.append(np.add.reduceat(np.where(seen, scaled, 0.0), edges, axis=0))
+        count.append(np.add.reduceat(seen.astype(float), edges, axis=0))
+    return FreeErrors(runs, model.drive.output_names, floors, np.concatenate(power), np.concatenate(count))
+
+
+@dataclass(frozen=True)
+class Shrink:
+    """Share of the excess error that is closed."""
+
+    overall: float
+    interval95: tuple[float, float]
+    by_channel: Mapping[str, float]
+
+
+def shrink(before: FreeErrors, after: FreeErrors, seed: int) -> Shrink:
+    """Compare errors over the same windows; the interval is that of a bootstrap over blocks."""
+    rng = np.random.default_rng(seed)
+    draws = rng.multinomial(len(before.power), np.full(len(before.power), 1.0 / len(before.power)), RESAMPLES)
+    shares = [_share(before.excess(draw), after.excess(draw)) for draw in draws.astype(float)]
+    low, high = np.quantile(shares, [0.025, 0.975])
+    first, then = (np.maximum(item.ratios() - 1.0, 0.0) for item in (before, after))
+    by_channel = {name: _share(float(first[k]), float(then[k])) for k, name in enumerate(before.channels)}
+    return Shrink(_share(before.excess(), after.excess()), (float(low), float(high)), by_channel)
+
+
+def _share(before: float, after: float) -> float:
+    return 1.0 - after / before if before > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of the gap map, in noise floors."""
+
+    component: str
+    channel: str
+    recording: str
+    regime: str
+    before: float
+    after: float
+
+
+def gap_map(base: FittedModel, before: FreeErrors, after: FreeErrors) -> tuple[Cell, ...]:
+    """Return rms errors over noise floors by channel, recording and regime."""
+    cells: list[Cell] = []
+    for first, then in zip(before.runs, after.runs, strict=True):
+        labels: IntArray = regimes(base.model, base.theta, first)
+        for k, channel in enumerate(base.model.problem.drive.outputs):
+            for code, regime in enumerate(REGIMES):
+                at = (labels == code) & np.isfinite(first.measured[:, k])
+                if np.any(at):
+                    sizes = (_rms(run, k, at) / before.floors[k] for run in (first, then))
+                    cells.append(Cell(channel.part, channel.name, first.name, regime, *sizes))
+    return tuple(cells)
+
+
+def _rms(run: FreeRun, column: int, at: BoolArray) -> float:
+    error: FloatArray = run.simulated[at, column] - run.measured[at, column]
+    return float(np.sqrt(np.mean(error**2)))

@@ -1,0 +1,251 @@
+"""A program linearised about a point, with its node states eliminated: what any small change does to the residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Residuals of all recordings at a point, every other row free of what node states and parameters can absorb."""
+
+    residual: FloatArray
+    """(rows,) at the solved nodes, in units of their standard deviations."""
+    jacobian: FloatArray
+    """(rows, parameters) along the manifold of solved nodes."""
+    recording: IntArray
+    """(rows,) index of the recording."""
+    time: FloatArray
+    """(rows,) s."""
+    channel: IntArray
+    """(rows,) output column; -1 for gaps, -2 for starts and priors."""
+    node: IntArray
+    """(rows,) grid node of the row."""
+
+    def absorbed(self, columns: FloatArray) -> FloatArray:
+        """Return what is left of columns once the parameters have absorbed what they can."""
+        basis = self.basis
+        return columns - basis @ (basis.T @ columns)
+
+    @property
+    def basis(self) -> FloatArray:
+        """(rows, rank) orthonormal basis of what the parameters can do."""
+        scale = np.linalg.norm(self.jacobian, axis=0)
+        told = scale > 0
+        if not told.any():
+            return np.zeros((self.residual.size, 0))
+        left, sizes, _ = np.linalg.svd(self.jacobian[:, told] / scale[told], full_matrices=False)
+        return left[:, sizes > 1e-10 * sizes[0]]
+
+
+class LinearRecording:
+    """One recording of a program at a point: the map from changes of the simulation to changes of the residuals."""
+
+    def __init__(self, program: Program, index: int, point: Point) -> None:
+        self.item, self.cut = program.experiments[index], program.segments[index]
+        self.index, self.nodes = index, point.nodes[index]
+        self.states = self.nodes.shape[1]
+        result = program.simulate(index, point, derivatives=True)
+        assert result.dy is not None and result.dend is not None
+        self.y, self.end = result.y, result.end
+        self.noise = program.noise
+        self.seen = np.isfinite(self.item.measured)
+        time = np.arange(self.item.grid.time.size)
+        self.segment = np.clip(np.searchsorted(self.cut.first, time, side="right") - 1, 0, self.cut.count - 1)
+        self.dy = result.dy[:, :, : self.states] / self.noise[:, None]
+        self.dend = result.dend[:, :, : self.states]
+        _, self.slope = program.space.numbers_and_slope(point.theta, self.item.name)
+        self._factor()
+        errors = np.where(self.seen, (self.y - self.item.measured) / self.noise, 0.0)
+        gaps, starts = self._gaps(self.end[:-1] - self.nodes[1:]), self._start_errors(program, point)
+        self.raw = self._stack(errors, gaps, starts)
+        by_theta = result.dy[:, :, self.states :] @ self.slope / self.noise[:, None]
+        end_theta = result.dend[:-1, :, self.states :] @ self.slope
+        columns = self._stack_columns(by_theta, end_theta, self._start_slopes(program, point))
+        self.direct = columns + self._measured_slopes(program, point)
+        self.jacobian = self.reduced(self.direct)
+        self.residual = self.reduced(self.raw[:, None])[:, 0]
+
+    def _gaps(self, gap: FloatArray) -> FloatArray:
+        if self.cut.gap_weight is None or self.cut.count < 2:
+            return np.zeros((0, self.states))
+        return np.einsum("kij,kj->ki", self.cut.gap_weight, gap)
+
+    def _start_errors(self, program: Program, point: Point) -> FloatArray:
+        if self.cut.start_weight is None:
+            return np.zeros((0, self.states))
+        tied = self.cut.tied
+        suggested, _ = program.measured_states(self.item, point.theta, self.cut.first[tied])
+        return self.cut.start_weight[tied] * (self.nodes[tied] - suggested)
+
+    def _start_slopes(self, program: Program, point: Point) -> FloatArray:
+        if self.cut.start_weight is None:
+            return np.zeros((0, self.states, point.theta.size))
+        tied = self.cut.tied
+        _, slopes = program.measured_states(self.item, point.theta, self.cut.first[tied])
+        return -self.cut.start_weight[tied][:, :, None] * slopes
+
+    def _measured_slopes(self, program: Program, point: Point) -> FloatArray:
+        """Return (rows, parameters) what the parameters do through nodes that the measurement gives."""
+        moved = np.zeros((self.cut.count, self.states, point.theta.size))
+        if self.cut.measured:
+            at = self.cut.first[: self.cut.measured]
+            moved[: self.cut.measured] = program.measured_states(self.item, point.theta, at)[1]
+        return self._applied(moved)
+
+    def _stack(self, errors: FloatArray, gaps: FloatArray, starts: FloatArray) -> FloatArray:
+        return np.concatenate([errors.ravel(), gaps.ravel(), starts.ravel()])
+
+    def _stack_columns(self, by_y: FloatArray, by_end: FloatArray, starts: FloatArray | None = None) -> FloatArray:
+        """Return (rows, k) from changes of scaled outputs (n, outputs, k) and of segment ends (segments - 1, s, k)."""
+        count = by_y.shape[2]
+        y = np.where(self.seen[:, :, None], by_y, 0.0).reshape(-1, count)
+        ends = np.zeros((0, count))
+        if self.cut.gap_weight is not None and self.cut.count > 1:
+            ends = np.einsum("kij,kjp->kip", self.cut.gap_weight, by_end).reshape(-1, count)
+        rest = np.zeros((self._start_rows, count)) if starts is None else starts.reshape(-1, count)
+        return np.concatenate([y, ends, rest])
+
+    @property
+    def _start_rows(self) -> int:
+        return 0 if self.cut.start_weight is None else int(self.cut.tied.size * self.states)
+
+    def change(self, by_y: FloatArray, by_end: FloatArray) -> FloatArray:
+        """Return (rows, k) what changes of outputs (n, outputs, k) and segment ends (segments, s, k) do in the end."""
+        return self.reduced(self._stack_columns(by_y / self.noise[:, None], by_end[:-1]))
+
+    def moved_by(self, step: FloatArray) -> FloatArray:
+        """Return (segments, states) how the nodes follow a change of the parameters."""
+        return self._solve(-self._transposed((self.direct @ step)[:, None]))[:, :, 0]
+
+    def reduced(self, columns: FloatArray) -> FloatArray:
+        """Return columns of rows with the nodes moved to their best places."""
+        moved = self._solve(-self._transposed(columns))
+        return columns + self._applied(moved)
+
+    def _applied(self, moved: FloatArray) -> FloatArray:
+        """Return the change of all rows for moved nodes (segments, s, k)."""
+        count = moved.shape[2]
+        y = np.einsum("nos,nsk->nok", self.dy, moved[self.segment])
+        y = np.where(self.seen[:, :, None], y, 0.0).reshape(-1, count)
+        parts = [y]
+        if self.cut.gap_weight is not None and self.cut.count > 1:
+            gap = np.einsum("kij,kjp->kip", self.dend[:-1], moved[:-1]) - moved[1:]
+            parts.append(np.einsum("kij,kjp->kip", self.cut.gap_weight, gap).reshape(-1, count))
+        if self.cut.start_weight is not None:
+            tied = self.cut.tied
+            parts.append((self.cut.start_weight[tied][:, :, None] * moved[tied]).reshape(-1, count))
+        return np.concatenate(parts)
+
+    def _transposed(self, columns: FloatArray) -> FloatArray:
+        """Return (segments, s, k) the gradient by the nodes of columns of rows."""
+        count, (n, outputs) = columns.shape[1], self.seen.shape
+        y = columns[: n * outputs].reshape(n, outputs, count)
+        by_sample = np.einsum("nos,nok->nsk", self.dy, np.where(self.seen[:, :, None], y, 0.0))
+        gradient = np.add.reduceat(by_sample, self.cut.first[:-1], axis=0)
+        at = n * outputs
+        if self.cut.gap_weight is not None and self.cut.count > 1:
+            size = (self.cut.count - 1) * self.states
+            gap = columns[at : at + size].reshape(-1, self.states, count)
+            pulled = np.einsum("kji,kjp->kip", self.cut.gap_weight, gap)
+            gradient[:-1] += np.einsum("kji,kjp->kip", self.dend[:-1], pulled)
+            gradient[1:] -= pulled
+            at += size
+        if self.cut.start_weight is not None:
+            tied = self.cut.tied
+            rest = columns[at:].reshape(-1, self.states, count)
+            np.add.at(gradient, tied, self.cut.start_weight[tied][:, :, None] * rest)
+        return gradient
+
+    def _factor(self) -> None:
+        """Factorise the block-tridiagonal normal matrix of the nodes."""
+        count, states, cut = self.cut.count, self.states, self.cut
+        seen = np.where(self.seen[:, :, None], self.dy, 0.0)
+        diagonal = np.add.reduceat(np.einsum("noi,noj->nij", seen, seen), cut.first[:-1], axis=0)
+        upper = np.zeros((max(count - 1, 0), states, states))
+        if cut.gap_weight is not None and count > 1:
+            forward = np.einsum("kij,kjl->kil", cut.gap_weight, self.dend[:-1])
+            diagonal[:-1] += np.einsum("kji,kjl->kil", forward, forward)
+            diagonal[1:] += np.einsum("kji,kjl->kil", cut.gap_weight, cut.gap_weight)
+            upper = -np.einsum("kji,kjl->kil", forward, cut.gap_weight)
+        if cut.start_weight is not None:
+            for j in cut.tied:
+                diagonal[j] += np.diag(cut.start_weight[j] ** 2)
+        index = np.arange(int(states))
+        diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
+        self.scale = 1.0 / np.sqrt(diagonal[:, index, index])
+        diagonal = diagonal * self.scale[:, :, None] * self.scale[:, None, :]
+        self.upper = upper * self.scale[:-1, :, None] * self.scale[1:, None, :]
+        self.inverse = np.empty_like(diagonal)
+        diagonal[: cut.measured] = np.eye(states)
+        self.upper[: cut.measured] = 0.0
+        for j in range(count):
+            block = diagonal[j]
+            if j:
+                lower = self.upper[j - 1].T
+                block = block - lower @ self.inverse[j - 1] @ self.upper[j - 1]
+            self.inverse[j] = np.linalg.inv(block)
+
+    def _solve(self, right: FloatArray) -> FloatArray:
+        """Return (segments, s, k) node changes for a right-hand side; measured nodes do not move."""
+        right = right * self.scale[:, :, None]
+        right[: self.cut.measured] = 0.0
+        count = right.shape[0]
+        for j in range(1, count):
+            right[j] -= self.upper[j - 1].T @ (self.inverse[j - 1] @ right[j - 1])
+        right[-1] = self.inverse[-1] @ right[-1]
+        for j in range(count - 2, -1, -1):
+            right[j] = self.inverse[j] @ (right[j] - self.upper[j] @ right[j + 1])
+        return right * self.scale[:, :, None]
+
+    def labels(self) -> tuple[FloatArray, IntArray, IntArray]:
+        """Return time, channel and grid node of every row."""
+        n, outputs = (int(size) for size in self.seen.shape)
+        time = np.repeat(self.item.grid.time, outputs)
+        channel, node = np.tile(np.arange(outputs), n), np.repeat(np.arange(n), outputs)
+        gaps = 0 if self.cut.gap_weight is None else max(self.cut.count - 1, 0)
+        at = np.repeat(self.cut.first[1:-1], self.states)[: gaps * self.states]
+        start = np.repeat(self.cut.first[self.cut.tied], self.states) if self._start_rows else np.zeros(0, int)
+        later = np.concatenate([at, start]).astype(np.int64)
+        kinds = np.concatenate([np.full(at.size, -1), np.full(start.size, -2)])
+        return (
+            np.concatenate([time, self.item.grid.time[later]]),
+            np.concatenate([channel, kinds]).astype(np.int64),
+            np.concatenate([node, later]).astype(np.int64),
+        )
+
+
+@dataclass(frozen=True)
+class LinearProgram:
+    """All recordings of a program at a point."""
+
+    program: Program
+    point: Point
+    recordings: tuple[LinearRecording, ...]
+    rows: Rows
+
+
+def linear_program(program: Program, point: Point) -> LinearProgram:
+    """Linearise a program."""
+    items = tuple(LinearRecording(program, index, point) for index in range(len(program.experiments)))
+    labels = [item.labels() for item in items]
+    space = program.space
+    prior = np.flatnonzero(np.isfinite(space.prior_std))
+    pull = np.zeros((prior.size, point.theta.size))
+    pull[np.arange(prior.size), prior] = 1.0 / space.prior_std[prior]
+    errors = (point.theta[prior] - space.prior_mean[prior]) / space.prior_std[prior]
+    none = np.full(prior.size, -1)
+    rows = Rows(
+        residual=np.concatenate([*(item.residual for item in items), errors]),
+        jacobian=np.concatenate([*(item.jacobian for item in items), pull]),
+        recording=np.concatenate([*(np.full(item.residual.size, k) for k, item in enumerate(items)), none]),
+        time=np.concatenate([*(label[0] for label in labels), np.zeros(prior.size)]),
+        channel=np.concatenate([*(label[1] for label in labels), np.full(prior.size, -2)]),
+        node=np.concatenate([*(label[2] for label in labels), np.zeros(prior.size, int)]),
+    )
+    return LinearProgram(program, point, items, rows)

@@ -1,0 +1,209 @@
+"""A diagnosis as the document that result.json holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friction_ocp.diagnosis.bias import Bias, biased_parameters
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
+from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
+from friction_ocp.diagnosis.next_experiment import next_experiment
+from friction_ocp.diagnosis.select import Rival, probabilities
+from friction_ocp.drive.units import signal_unit, unit_of
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.noise import NoiseFloor
+from friction_ocp.result_document import provenance
+
+FORMAT = "friction-ocp-diagnosis/1"
+
+
+def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the content of result.json for a diagnosis."""
+    problem = diagnosis.problem
+    return {
+        "format": FORMAT,
+        "status": "diagnosed",
+        "title": problem.title,
+        "question": problem.question,
+        "problem": problem.path.name if problem.path else "",
+        "recordings": {
+            "train": [use.name for use in problem.train],
+            "validation": [use.name for use in problem.validation],
+        },
+        "verdict": diagnosis.verdict,
+        "where": _where(diagnosis),
+        "rounds": [_round(diagnosis, item) for item in diagnosis.rounds],
+        "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
+        "accepted": [{**_named(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
+        "remainder": _remainder(diagnosis),
+        "gap": _gap(diagnosis),
+        "biased_parameters": [_bias(item) for item in biased_parameters(diagnosis.base, diagnosis.final)],
+        "next_experiment": next_experiment(diagnosis),
+        "significance": diagnosis.level,
+        "assumptions": _assumptions(diagnosis),
+        "seconds": diagnosis.seconds,
+        "channel_units": _units(diagnosis),
+        "provenance": provenance(problem),
+    }
+
+
+def _named(key: Key) -> dict[str, str]:
+    return {"effect": key[0], "component": key[1]}
+
+
+def _units(diagnosis: Diagnosis) -> dict[str, str]:
+    drive = diagnosis.problem.drive
+    return {item.name: signal_unit(drive, item.measures) for item in drive.outputs}
+
+
+def _where(diagnosis: Diagnosis) -> dict[str, Any]:
+    cells = gap_map(diagnosis.base, diagnosis.before, diagnosis.after)
+    return {
+        "components": list(dict.fromkeys(component for _, component in diagnosis.accepted)),
+        "depends_on": None,
+        "map": [
+            {
+                "component": cell.component,
+                "channel": cell.channel,
+                "recording": cell.recording,
+                "regime": cell.regime,
+                "before": _number(cell.before),
+                "after": _number(cell.after),
+            }
+            for cell in cells
+        ],
+    }
+
+
+def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
+    gap = item.accepted is not None or item.excess.significant(diagnosis.level)
+    available = max(item.before.objective - 0.5 * _samples(item), 1e-300)
+    pairs = zip(item.choice.rivals, item.choice.probabilities, strict=True)
+    causes = [_cause(item, rival, chance, available) for rival, chance in pairs]
+    refitted = {rival.key for rival in item.choice.rivals}
+    rest = [seen for seen in item.screened if seen.key not in refitted]
+    causes += [
+        {
+            **_named(seen.key),
+            "probability": 0.0,
+            "predicted_gain": _share(seen.gain, available),
+            "refit_gain": None,
+            "heldout_gain": None,
+            "p_value": seen.p_value,
+            "parameters": {path: _number(value) for path, value in seen.values.items()},
+        }
+        for seen in rest
+    ]
+    return {
+        "probabilities": dict(probabilities(item.choice, gap)),
+        "excess": {"ratio": item.excess.ratio, "p_value": item.excess.p_value},
+        "accepted": None if item.accepted is None else _named(item.accepted.key),
+        "causes": causes,
+    }
+
+
+def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[str, Any]:
+    known = set(item.before.values)
+    return {
+        **_named(rival.key),
+        "probability": chance,
+        "predicted_gain": _share(rival.screened.gain, available),
+        "refit_gain": _share(item.before.objective - rival.fitted.objective, available),
+        "heldout_gain": _share(float(np.sum(rival.gains)), available),
+        "p_value": rival.screened.p_value,
+        "parameters": {name: value for name, value in rival.fitted.values.items() if name not in known},
+    }
+
+
+def _samples(item: Round) -> int:
+    rows = item.before.linear.rows
+    return int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
+
+
+def _share(gain: float, available: float) -> float:
+    return float(np.clip(gain / available, -1.0, 1.0))
+
+
+def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
+    """Return the final values of what an accepted effect added."""
+    done = next(item for item in diagnosis.rounds if item.accepted is not None and item.accepted.key == key)
+    assert done.accepted is not None
+    names = set(done.accepted.fitted.values) - set(done.before.values)
+    drive = diagnosis.final.model.problem.drive
+    units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
+    final = diagnosis.final.values
+    return {name: {"value": final[name], "unit": units[name.partition("@")[0]]} for name in sorted(names)}
+
+
+def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
+    significant = diagnosis.remainder.significant(diagnosis.level)
+    last = diagnosis.rounds[-1]
+    component = last.screened[0].component if significant and last.screened else None
+    return {"significant": significant, "component": component, "ratio": diagnosis.remainder.ratio}
+
+
+def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
+    problem, model = diagnosis.problem, diagnosis.base.model
+    closed = shrink(diagnosis.before, diagnosis.after, problem.estimation.seed)
+    sources = {floor.source for floor in model.floors.values()}
+    return {
+        "evaluated_on": [use.name for use in (problem.validation or problem.train)],
+        "horizon_s": horizon(model),
+        "noise_source": sources.pop() if len(sources) == 1 else "mixed",
+        "before": _table(diagnosis, diagnosis.before),
+        "after": _table(diagnosis, diagnosis.after),
+        "shrink": {
+            "overall": _number(closed.overall),
+            "interval95": [_number(end) for end in closed.interval95],
+            **{name: _number(value) for name, value in closed.by_channel.items()},
+        },
+    }
+
+
+def _table(diagnosis: Diagnosis, errors: FreeErrors) -> dict[str, Any]:
+    floors: Mapping[str, NoiseFloor] = diagnosis.base.model.floors
+    units = _units(diagnosis)
+    ratios = np.sqrt(errors.ratios())
+    return {
+        name: {
+            "rms": _number(float(ratios[k]) * floors[name].std),
+            "unit": units[name],
+            "noise_ratio": _number(float(ratios[k])),
+            "noise_source": floors[name].source,
+        }
+        for k, name in enumerate(errors.channels)
+    }
+
+
+def _bias(item: Bias) -> dict[str, Any]:
+    return {
+        "name": item.name,
+        "before": item.before,
+        "after": item.after,
+        "unit": item.unit,
+        "interval95": [_number(end) for end in item.interval95],
+    }
+
+
+def _assumptions(diagnosis: Diagnosis) -> list[str]:
+    foot = diagnosis.base.footing
+    lines = [
+        f"{name}: noise floor {floor.std:.3g} ({floor.source})" for name, floor in diagnosis.base.model.floors.items()
+    ]
+    lines += [
+        f"{shaft}: torque noise {density:.3g} N m/sqrt(Hz), from the measured inputs and what the file states"
+        for shaft, density in foot.density.items()
+    ]
+    lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
+    lines.append(f"the catalogue: {', '.join(effects())}")
+    return lines
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,206 @@
+"""What an unmodelled effect is: a way to add something to a drive, with an off value that gives the drive back."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+PEAKS = 4
+"""Periods that are tried."""
+LINES = 600
+"""Frequencies at which a spectrum is looked at."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One recording as the fitted drive passes through it."""
+
+    time: FloatArray
+    """(n,) s."""
+    theta: Mapping[str, FloatArray]
+    """By shaft, rad."""
+    omega: Mapping[str, FloatArray]
+    """By shaft, rad/s."""
+    torque: Mapping[str, FloatArray]
+    """By motor, on its shaft, N m."""
+    middle: IntArray
+    """(segments,) samples at which the missing torque is known."""
+    missing: Mapping[str, FloatArray]
+    """By shaft (segments,) the torque that the model lacks if the shaft is where it lacks one, N m."""
+
+
+@dataclass(frozen=True)
+class Clues:
+    """What recordings and base fit say about sizes and places, for initial guesses."""
+
+    tracks: tuple[Track, ...]
+    numbers: Mapping[str, float]
+    """Every number of the drive in the first recording, by path."""
+    typical_torque: Mapping[str, float]
+    """By shaft, N m: what moves it."""
+
+    def speeds(self, shaft: str) -> FloatArray:
+        """Return all speeds of a shaft, rad/s."""
+        return np.concatenate([track.omega[shaft] for track in self.tracks])
+
+    def angles(self, shaft: str) -> FloatArray:
+        """Return all angles of a shaft, rad."""
+        return np.concatenate([track.theta[shaft] for track in self.tracks])
+
+    def typical_speed(self, shaft: str) -> float:
+        """Return the rms speed of a shaft, rad/s."""
+        return max(float(np.sqrt(np.mean(self.speeds(shaft) ** 2))), 1e-12)
+
+    def periods(
+        self, shaft: str, over: str, against_motion: bool = False, against_torque: str | None = None
+    ) -> list[float]:
+        """Return the likeliest periods of the missing torque of a shaft over its angle ("theta") or "time".
+
+        `against_motion` looks for a wave times the sign of the speed, `against_torque` times a motor's torque. Without
+        a missing torque, harmonics of a turn, or parts of the longest recording.
+        """
+        place = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
+        travel = max(float(np.ptp(one)) for one in place)
+        frequencies = np.linspace(0.5, LINES / 2.0, LINES) / max(travel, 1e-300)
+        power = np.zeros(LINES)
+        for track, one in zip(self.tracks, place, strict=True):
+            if track.middle.size < 8:
+                continue
+            factor = np.ones(track.middle.size)
+            if against_motion:
+                factor = np.sign(track.omega[shaft][track.middle])
+            if against_torque is not None:
+                factor = track.torque[against_torque][track.middle]
+            power += _spectrum(one[track.middle] - one[0], track.missing[shaft], factor, frequencies)
+        if not np.any(power):
+            turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
+            return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
+        return [float(1.0 / frequencies[k]) for k in _peaks(power)]
+
+    def speed_quantiles(self, shaft: str, shares: Sequence[float]) -> list[float]:
+        """Return speeds below which the shaft moves for the given shares of the time that it moves at all."""
+        speed = np.abs(self.speeds(shaft))
+        moving = speed[speed > 1e-3 * float(np.max(speed, initial=0.0))]
+        return [float(value) for value in np.quantile(moving, shares)] if moving.size else [1.0 for _ in shares]
+
+
+def _spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Return the share of squares that a wave of each frequency takes, at uneven places (Lomb 1976)."""
+    power = np.zeros(frequencies.size)
+    plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
+    for k, frequency in enumerate(frequencies):
+        basis = factor[:, None] * np.column_stack(
+            [np.cos(2.0 * np.pi * frequency * place), np.sin(2.0 * np.pi * frequency * place)]
+        )
+        gram, pull = basis.T @ basis, basis.T @ plain
+        power[k] = float(pull @ np.linalg.lstsq(gram, pull, rcond=1e-9)[0])
+    return power
+
+
+def _peaks(power: FloatArray) -> list[int]:
+    """Return the places of the highest peaks, highest first."""
+    inner = np.concatenate([[-np.inf], power, [-np.inf]])
+    peaks = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
+    return [int(k) for k in peaks[np.argsort(-power[peaks])][:PEAKS]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Values at which an addition is tried: one column of the score test for each amplitude."""
+
+    amplitudes: tuple[Mapping[str, float], ...]
+    """On-values; the parameters named in one of them grow together."""
+    fixed: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Values of the other parameters of the addition: a period, a break, a shape."""
+    inverse: bool = False
+    """Whether 1/value, not value - off, is what grows: a stiffness is off where it is infinite."""
+
+    def values(self, off: Mapping[str, float], sizes: Sequence[float]) -> dict[str, float]:
+        """Return all values of the addition where every amplitude is `sizes` times its on-value."""
+        at = {**off, **self.fixed}
+        for amplitude, size in zip(self.amplitudes, sizes, strict=True):
+            for path, on in amplitude.items():
+                at[path] = (
+                    on / max(size, 1e-3) if self.inverse else at.get(path, 0.0) + size * (on - off.get(path, 0.0))
+                )
+        return at
+
+
+@dataclass(frozen=True)
+class Augmentation:
+    """A drive with an addition."""
+
+    drive: Drive
+    """Its added parameters are free, each with bounds and a guess."""
+    off: Mapping[str, float]
+    """Values of the added parameters at which the drive is the one it was."""
+    trials: tuple[Trial, ...]
+
+
+class AbstractEffect(ABC):
+    """Something that a model may lack. Instances hold no data: an effect is added at a place of a drive."""
+
+    name: ClassVar[str]
+    sentence: ClassVar[str]
+    """What it means, for the reader."""
+
+    @abstractmethod
+    def places(self, drive: Drive) -> Iterable[str]:
+        """Return the components at which the effect makes sense and is not modelled yet."""
+
+    @abstractmethod
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        """Return the drive with the effect at a place."""
+
+
+def change_shaft(drive: Drive, name: str, **changes: Any) -> Drive:
+    """Return the drive with some fields of a shaft replaced."""
+    shafts = tuple(replace(item, **changes) if item.name == name else item for item in drive.shafts)
+    return replace(drive, shafts=shafts)
+
+
+def change_transmission(drive: Drive, name: str, **changes: Any) -> Drive:
+    """Return the drive with some fields of a transmission replaced."""
+    items = tuple(replace(item, **changes) if item.name == name else item for item in drive.transmissions)
+    return replace(drive, transmissions=items)
+
+
+def change_motor(drive: Drive, name: str, **changes: Any) -> Drive:
+    """Return the drive with some fields of a motor replaced."""
+    return replace(drive, motors=tuple(replace(m, **changes) if m.name == name else m for m in drive.motors))
+
+
+def change_channel(drive: Drive, name: str, **changes: Any) -> Drive:
+    """Return the drive with some fields of a channel replaced."""
+    return replace(drive, channels=tuple(replace(c, **changes) if c.name == name else c for c in drive.channels))
+
+
+def transmission(drive: Drive, name: str) -> Transmission:
+    """Return the transmission called `name`."""
+    return next(item for item in drive.transmissions if item.name == name)
+
+
+def motor_of(drive: Drive, shaft: str) -> Motor | None:
+    """Return the motor on a shaft."""
+    return next((motor for motor in drive.motors if motor.shaft == shaft), None)
+
+
+def channel(drive: Drive, name: str) -> Channel:
+    """Return the channel called `name`."""
+    return next(item for item in drive.channels if item.name == name)
+
+
+def moving_shafts(drive: Drive) -> list[Shaft]:
+    """Return the shafts whose motion is not prescribed by an input."""
+    driven = {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
+    return [shaft for shaft in drive.shafts if shaft.name not in driven]

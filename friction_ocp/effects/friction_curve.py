@@ -1,0 +1,133 @@
+"""Effects on the curve of friction over speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from friction_ocp.drive.parts import Drive, Shaft
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.friction.composite import Bend, StribeckRise, added_terms, plain_law, viscous_part, with_added
+from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.maxwell import AbstractMaxwellSlip
+from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Viscous
+from friction_ocp.parameters import Directional, Free, Tie
+
+SHARE = 0.05
+"""Size of a trial over the torque that moves the shaft: small, yet far above rounding."""
+
+
+def with_friction(drive: Drive, shaft: Shaft, **terms: Any) -> Drive:
+    """Return the drive with terms added to the friction of a shaft."""
+    element = shaft.friction
+    return change_shaft(drive, shaft.name, friction=replace(element, law=with_added(element.law, **terms)))
+
+
+def lacks(law: AbstractFrictionLaw, term: str) -> bool:
+    """Whether terms can be added to a law, and it has none of this name."""
+    if isinstance(law, AbstractMaxwellSlip):
+        return False
+    terms = added_terms(law)
+    return terms is None or getattr(terms, term) is None
+
+
+def is_dry(shaft: Shaft) -> bool:
+    """Whether a shaft has dry friction."""
+    return not isinstance(plain_law(shaft.friction.law), (NoFriction, Viscous))
+
+
+class StribeckEffect(AbstractEffect):
+    """Friction falls with speed near standstill."""
+
+    name: ClassVar[str] = "stribeck"
+    sentence: ClassVar[str] = "friction falls with speed near standstill"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        for shaft in moving_shafts(drive):
+            law = shaft.friction.law
+            if is_dry(shaft) and lacks(law, "stribeck") and not hasattr(plain_law(law), "tau_s"):
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        path, size = f"{place}.friction.added.stribeck", SHARE * clues.typical_torque[place]
+        speed = clues.typical_speed(place)
+        speeds = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
+        guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
+        rise = StribeckRise(Free(size, 0.0, 1e3 * size), guess, 2.0)
+        trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.omega_s": omega_s}) for omega_s in speeds)
+        added = with_friction(drive, drive.shaft(place), stribeck=rise)
+        return Augmentation(added, {f"{path}.torque": 0.0}, trials)
+
+
+class PolylineBreakEffect(AbstractEffect):
+    """The viscous slope changes at a speed."""
+
+    name: ClassVar[str] = "polyline_break"
+    sentence: ClassVar[str] = "the viscous slope changes at a speed"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        for shaft in moving_shafts(drive):
+            law = shaft.friction.law
+            if not isinstance(plain_law(law), NoFriction) and lacks(law, "bend"):
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        path, fastest = f"{place}.friction.added.bend", max(clues.speed_quantiles(place, (0.98,))[0], 1e-12)
+        slope = SHARE * clues.typical_torque[place] / fastest
+        breaks = clues.speed_quantiles(place, (0.2, 0.35, 0.5, 0.65, 0.8, 0.9))
+        bend = Bend(Free(slope, -1e3 * slope, 1e3 * slope), Free(breaks[2], 0.02 * fastest, fastest))
+        trials = tuple(Trial(({f"{path}.slope": slope},), {f"{path}.speed": speed}) for speed in breaks)
+        added = with_friction(drive, drive.shaft(place), bend=bend)
+        return Augmentation(added, {f"{path}.slope": 0.0}, trials)
+
+
+class QuadraticDragEffect(AbstractEffect):
+    """Friction curves with speed."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    sentence: ClassVar[str] = "friction curves with speed: windage, churning, lubricant"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        for shaft in moving_shafts(drive):
+            law = shaft.friction.law
+            if not isinstance(plain_law(law), (NoFriction, Quadratic)) and lacks(law, "quadratic"):
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        path = f"{place}.friction.added.quadratic"
+        size = SHARE * clues.typical_torque[place] / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12) ** 2
+        added = with_friction(drive, drive.shaft(place), quadratic=Free(size, -1e3 * size, 1e3 * size))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+
+
+class AsymmetryEffect(AbstractEffect):
+    """Coulomb or viscous friction differs by direction."""
+
+    name: ClassVar[str] = "asymmetry"
+    sentence: ClassVar[str] = "Coulomb or viscous friction differs by direction"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        for shaft in moving_shafts(drive):
+            law = shaft.friction.law
+            directional = any(isinstance(value, Directional) for value in vars(plain_law(law)).values())
+            plain = not isinstance(plain_law(law), NoFriction) and not directional
+            if plain and lacks(law, "coulomb") and lacks(law, "viscous"):
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        shaft, stem = drive.shaft(place), f"{place}.friction.added"
+        size = SHARE * clues.typical_torque[place]
+        slope = size / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12)
+        sizes = {"coulomb": size} if is_dry(shaft) else {}
+        if viscous_part(shaft.friction.law) is not None or isinstance(plain_law(shaft.friction.law), Polyline):
+            sizes["viscous"] = slope
+        terms = {key: _odd(f"{stem}.{key}.positive", value) for key, value in sizes.items()}
+        paths = {f"{stem}.{key}.positive": value for key, value in sizes.items()}
+        trial = Trial(tuple({path: value} for path, value in paths.items()))
+        return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(paths, 0.0), (trial,))
+
+
+def _odd(path: str, size: float) -> Directional:
+    """Return a term that is added in one direction and taken off in the other."""
+    return Directional(Free(size, -1e3 * size, 1e3 * size), Tie(f"-1 * {path}"))

@@ -1,0 +1,65 @@
+"""Effects of friction beyond its curve over speed: bristles, load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.friction_curve import is_dry
+from friction_ocp.friction.composite import Bristle, with_bristle
+from friction_ocp.friction.element import LoadDependence
+from friction_ocp.parameters import Free
+
+
+class PreslidingEffect(AbstractEffect):
+    """Elastic hysteresis before breakaway."""
+
+    name: ClassVar[str] = "presliding"
+    sentence: ClassVar[str] = "elastic hysteresis before breakaway (bristles)"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        for shaft in moving_shafts(drive):
+            if is_dry(shaft) and not shaft.friction.law.has_bristle:
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        shaft, path = drive.shaft(place), f"{place}.friction.bristle.sigma0"
+        breakaway = _breakaway(clues, place)
+        travel = max(float(np.ptp(track.theta[place])) for track in clues.tracks)
+        shares = (1e-4, 1e-3, 1e-2, 5e-2)
+        stiffnesses = [breakaway / max(share * travel, 1e-300) for share in shares]
+        bristle = Bristle(Free(stiffnesses[1], 1e-2 * stiffnesses[-1], 1e3 * stiffnesses[0]), 0.0)
+        law = with_bristle(shaft.friction.law, bristle)
+        added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
+        trials = tuple(Trial(({path: stiffness},), inverse=True) for stiffness in stiffnesses)
+        return Augmentation(added, {path: np.inf}, trials)
+
+
+def _breakaway(clues: Clues, place: str) -> float:
+    stem = f"{place}.friction.tau_c"
+    known = [value for path, value in clues.numbers.items() if path.startswith(stem) and value > 0]
+    return known[0] if known else 0.1 * clues.typical_torque[place]
+
+
+class LoadDependenceEffect(AbstractEffect):
+    """Friction grows with the transmitted torque."""
+
+    name: ClassVar[str] = "load_dependence"
+    sentence: ClassVar[str] = "friction grows with the transmitted torque"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        ends = {name for item in drive.transmissions for name in (item.from_shaft, item.to_shaft)}
+        for shaft in moving_shafts(drive):
+            if shaft.name in ends and is_dry(shaft) and shaft.friction.load is None:
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        shaft, path = drive.shaft(place), f"{place}.friction.load.coulomb"
+        element = replace(shaft.friction, load=LoadDependence(Free(0.05, 0.0, 5.0)))
+        added = change_shaft(drive, place, friction=element)
+        return Augmentation(added, {path: 0.0}, (Trial(({path: 0.05},)),))

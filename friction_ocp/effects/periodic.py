@@ -1,0 +1,125 @@
+"""Effects periodic in an angle or in time; their periods come from the spectrum of the torque that is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from friction_ocp.drive.parts import Cogging, Disturbance, Drive, Eccentricity, TorqueRipple
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    change_channel,
+    change_motor,
+    change_shaft,
+    motor_of,
+    moving_shafts,
+)
+from friction_ocp.effects.friction_curve import SHARE, is_dry
+from friction_ocp.friction.modifiers import Ripple
+from friction_ocp.parameters import Free
+
+WIDE = 1e3
+"""Bound of an amplitude over the size of its trial."""
+
+
+def wave(
+    kind: type[Any], path: str, size: float, periods: list[float]
+) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
+    """Return a wave with free amplitudes and period, its off values and a trial for each period."""
+    amplitude = Free(size, -WIDE * size, WIDE * size)
+    period = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
+    paths = [f"{path}.{part}" for part in ("cosine", "sine")]
+    trials = tuple(Trial(tuple({name: size} for name in paths), {f"{path}.period": each}) for each in periods)
+    return kind(amplitude, amplitude, period), dict.fromkeys(paths, 0.0), trials
+
+
+class PositionRippleEffect(AbstractEffect):
+    """Friction varies with the angle."""
+
+    name: ClassVar[str] = "position_ripple"
+    sentence: ClassVar[str] = "friction varies with the angle"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in moving_shafts(drive) if is_dry(item) and item.friction.ripple is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        path, element = f"{place}.friction.ripple", drive.shaft(place).friction
+        part, off, trials = wave(Ripple, path, SHARE, clues.periods(place, "theta", against_motion=True))
+        return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
+
+
+class CoggingEffect(AbstractEffect):
+    """Torque periodic in the motor angle."""
+
+    name: ClassVar[str] = "cogging"
+    sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        motors = {motor.shaft: motor for motor in drive.motors}
+        return [
+            shaft.name for shaft in moving_shafts(drive) if shaft.name in motors and motors[shaft.name].cogging is None
+        ]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        motor = motor_of(drive, place)
+        assert motor is not None
+        size, periods = SHARE * clues.typical_torque[place], clues.periods(place, "theta")
+        part, off, trials = wave(Cogging, f"{motor.name}.cogging", size, periods)
+        return Augmentation(change_motor(drive, motor.name, cogging=part), off, trials)
+
+
+class TorqueRippleEffect(AbstractEffect):
+    """Torque periodic in the motor angle and proportional to current."""
+
+    name: ClassVar[str] = "torque_ripple"
+    sentence: ClassVar[str] = "the motor's torque ripples with its angle, in proportion to the current"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        motors = {motor.shaft: motor for motor in drive.motors}
+        free = [shaft.name for shaft in moving_shafts(drive) if shaft.name in motors]
+        return [name for name in free if motors[name].torque_ripple is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        motor = motor_of(drive, place)
+        assert motor is not None
+        periods = clues.periods(place, "theta", against_torque=motor.name)
+        part, off, trials = wave(TorqueRipple, f"{motor.name}.torque_ripple", SHARE, periods)
+        return Augmentation(change_motor(drive, motor.name, torque_ripple=part), off, trials)
+
+
+class PeriodicDisturbanceEffect(AbstractEffect):
+    """External torque periodic in time."""
+
+    name: ClassVar[str] = "periodic_disturbance"
+    sentence: ClassVar[str] = "an external torque periodic in time"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in moving_shafts(drive) if item.disturbance is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        path, size = f"{place}.disturbance", SHARE * clues.typical_torque[place]
+        part, off, trials = wave(Disturbance, path, size, clues.periods(place, "time"))
+        return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
+
+
+class SensorEccentricityEffect(AbstractEffect):
+    """A once-per-turn error of an angle sensor."""
+
+    name: ClassVar[str] = "sensor_eccentricity"
+    sentence: ClassVar[str] = "the angle sensor has a once-per-turn error"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        rotary = {shaft.name for shaft in drive.shafts if shaft.motion == "rotary"}
+        angles = [item for item in drive.outputs if item.signal == "theta" and item.part in rotary]
+        return [item.name for item in angles if item.eccentricity is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        size, path = 1e-3, f"{place}.eccentricity"
+        amplitude = Free(size, -0.2, 0.2)
+        paths = [f"{path}.cosine", f"{path}.sine"]
+        added = change_channel(drive, place, eccentricity=Eccentricity(amplitude, amplitude))
+        return Augmentation(added, dict.fromkeys(paths, 0.0), (Trial(tuple({name: size} for name in paths)),))

@@ -1,0 +1,70 @@
+"""The catalogue of effects: one line an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import AbstractEffect
+from friction_ocp.effects.friction_curve import (
+    AsymmetryEffect,
+    PolylineBreakEffect,
+    QuadraticDragEffect,
+    StribeckEffect,
+)
+from friction_ocp.effects.friction_state import LoadDependenceEffect, PreslidingEffect
+from friction_ocp.effects.friction_time import WarmUpEffect
+from friction_ocp.effects.joints import BacklashEffect, ComplianceEffect
+from friction_ocp.effects.periodic import (
+    CoggingEffect,
+    PeriodicDisturbanceEffect,
+    PositionRippleEffect,
+    SensorEccentricityEffect,
+    TorqueRippleEffect,
+)
+from friction_ocp.effects.sensors import SensorDelayEffect, SensorGainEffect, SensorOffsetEffect
+from friction_ocp.effects.stated_values import InertiaErrorEffect, ParameterErrorEffect
+from friction_ocp.effects.torques import ConstantTorqueEffect, StructuralModeEffect, UnbalanceEffect
+
+BUILT_IN: tuple[type[AbstractEffect], ...] = (
+    StribeckEffect,
+    PolylineBreakEffect,
+    QuadraticDragEffect,
+    AsymmetryEffect,
+    PreslidingEffect,
+    LoadDependenceEffect,
+    PositionRippleEffect,
+    WarmUpEffect,
+    CoggingEffect,
+    TorqueRippleEffect,
+    BacklashEffect,
+    ComplianceEffect,
+    UnbalanceEffect,
+    ConstantTorqueEffect,
+    PeriodicDisturbanceEffect,
+    StructuralModeEffect,
+    InertiaErrorEffect,
+    ParameterErrorEffect,
+    SensorOffsetEffect,
+    SensorGainEffect,
+    SensorDelayEffect,
+    SensorEccentricityEffect,
+)
+
+
+def effects() -> dict[str, AbstractEffect]:
+    """Return all effects by name, those of installed packages (entry point `friction_ocp.effects`) included."""
+    known = {kind.name: kind() for kind in BUILT_IN}
+    for point in entry_points(group="friction_ocp.effects"):
+        kind: type[AbstractEffect] = point.load()
+        known[kind.name] = kind()
+    return known
+
+
+def candidates(drive: Drive, names: list[str]) -> Iterator[tuple[AbstractEffect, str]]:
+    """Yield every effect of these names at every place of a drive where it makes sense."""
+    catalogue = effects()
+    for name in names:
+        for place in catalogue[name].places(drive):
+            yield catalogue[name], place

@@ -1,0 +1,77 @@
+"""Effects in the measurement, not in the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import ClassVar
+
+import numpy as np
+
+from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_channel, channel
+from friction_ocp.parameters import Free
+
+_ANALOG = ("theta", "omega", "alpha", "current", "current_command", "torque", "voltage")
+
+
+def _known(value: object) -> bool:
+    return isinstance(value, (int, float))
+
+
+def _size(item: Channel, clues: Clues) -> float:
+    """Return the typical size of what a channel records."""
+    if item.signal in ("theta", "omega"):
+        table = clues.angles(item.part) if item.signal == "theta" else clues.speeds(item.part)
+        return max(float(np.std(table)), 1e-12)
+    torques = [track.torque[item.part] for track in clues.tracks if item.part in track.torque]
+    if torques:
+        constant = clues.numbers.get(f"{item.part}.torque_constant", 1.0)
+        factor = 1.0 if item.signal == "torque" else 1.0 / max(abs(constant), 1e-300)
+        return max(float(np.std(np.concatenate(torques))) * factor, 1e-12)
+    return 1.0
+
+
+class SensorOffsetEffect(AbstractEffect):
+    """The channel records a constant too much."""
+
+    name: ClassVar[str] = "sensor_offset"
+    sentence: ClassVar[str] = "the channel has an offset"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.channels if item.signal in _ANALOG and item.offset == 0.0]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        size, path = 0.02 * _size(channel(drive, place), clues), f"{place}.offset"
+        added = change_channel(drive, place, offset=Free(size, -1e3 * size, 1e3 * size))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+
+
+class SensorGainEffect(AbstractEffect):
+    """The channel records a multiple of what it should."""
+
+    name: ClassVar[str] = "sensor_gain"
+    sentence: ClassVar[str] = "the channel has a wrong scale"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.channels if item.signal in _ANALOG and _known(item.gain)]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        gain, path = float(channel(drive, place).gain), f"{place}.gain"
+        low, high = sorted((0.3 * gain, 3.0 * gain))
+        added = change_channel(drive, place, gain=Free(gain, low, high))
+        return Augmentation(added, {path: gain}, (Trial(({path: 1.02 * gain},)),))
+
+
+class SensorDelayEffect(AbstractEffect):
+    """The channel is late."""
+
+    name: ClassVar[str] = "sensor_delay"
+    sentence: ClassVar[str] = "the channel is late"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.outputs if item.signal in ("theta", "omega") and item.delay == 0.0]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{place}.delay"
+        added = change_channel(drive, place, delay=Free(step, -20.0 * step, 100.0 * step))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: step},)),))

@@ -1,0 +1,83 @@
+"""Effects that put a torque on a shaft, or a further body beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from friction_ocp.drive.parts import Drive, ExternalTorque, Gravity, Shaft, Transmission
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.friction_curve import SHARE
+from friction_ocp.parameters import Free
+
+
+class UnbalanceEffect(AbstractEffect):
+    """Gravity torque on the shaft."""
+
+    name: ClassVar[str] = "unbalance"
+    sentence: ClassVar[str] = "gravity pulls at the shaft: an unbalanced mass"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        known = {shaft.name for shaft in drive.shafts if shaft.gravity is not None and shaft.gravity.torque != 0.0}
+        return [item.name for item in moving_shafts(drive) if item.motion == "rotary" and item.name not in known]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        size, torque, phase = SHARE * clues.typical_torque[place], f"{place}.gravity.torque", f"{place}.gravity.phase"
+        gravity = Gravity(Free(size, -1e3 * size, 1e3 * size), Free(0.0, -2.0 * np.pi, 2.0 * np.pi))
+        added = change_shaft(drive, place, gravity=gravity)
+        trials = tuple(Trial(({torque: size},), {phase: angle}) for angle in np.pi * np.arange(8) / 8)
+        return Augmentation(added, {torque: 0.0, phase: 0.0}, trials)
+
+
+class ConstantTorqueEffect(AbstractEffect):
+    """A constant torque."""
+
+    name: ClassVar[str] = "constant_torque"
+    sentence: ClassVar[str] = "a constant torque pulls at the shaft"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in moving_shafts(drive) if item.external_torque is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        size, path = SHARE * clues.typical_torque[place], f"{place}.external_torque.constant"
+        added = change_shaft(drive, place, external_torque=ExternalTorque(Free(size, -1e3 * size, 1e3 * size)))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+
+
+class StructuralModeEffect(AbstractEffect):
+    """A further inertia on a spring."""
+
+    name: ClassVar[str] = "structural_mode"
+    sentence: ClassVar[str] = "a further inertia hangs on the shaft by a spring"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        taken = {shaft.name for shaft in drive.shafts}
+        for shaft in moving_shafts(drive):
+            if not shaft.name.endswith("_mode") and f"{shaft.name}_mode" not in taken:
+                yield shaft.name
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        shaft, mode = drive.shaft(place), f"{place}_mode"
+        inertia = 0.1 * clues.numbers[f"{place}.inertia"]
+        step = float(np.median(np.diff(clues.tracks[0].time)))
+        longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
+        rates = 2.0 * np.pi * np.geomspace(5.0 / longest, 0.1 / step, 12)
+        stiffness, damping = f"{place}-{mode}.stiffness", f"{place}-{mode}.damping"
+        springs = [float(inertia * rate**2) for rate in rates]
+        joint = Transmission(
+            place,
+            mode,
+            1.0,
+            stiffness=Free(springs[6], 0.1 * springs[0], 10.0 * springs[-1]),
+            damping=Free(0.1 * inertia * float(rates[6]), 0.0, 10.0 * inertia * float(rates[-1])),
+        )
+        body = Shaft(mode, Free(inertia, 1e-3 * inertia, 1e2 * inertia), motion=shaft.motion)
+        added = replace(drive, shafts=(*drive.shafts, body), transmissions=(*drive.transmissions, joint))
+        trials = tuple(
+            Trial(({f"{mode}.inertia": inertia},), {stiffness: spring, damping: float(0.1 * inertia * rate)})
+            for spring, rate in zip(springs, rates, strict=True)
+        )
+        return Augmentation(added, {f"{mode}.inertia": 0.0}, trials)

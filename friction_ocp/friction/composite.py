@@ -1,0 +1,177 @@
+"""Friction laws put together: any law with further terms, any static law under a bristle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from friction_ocp.friction.bristle import AbstractBristleLaw
+from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.smoothing import positive_part
+from friction_ocp.friction.static import stribeck_share
+from friction_ocp.parameters import Value, inline, quantity
+
+
+@dataclass(frozen=True)
+class StribeckRise:
+    """Extra friction near standstill: torque exp(-(speed / omega_s)^delta)."""
+
+    torque: Value = quantity("torque", "extra friction at standstill", nested=0.0)
+    omega_s: Value = quantity("speed", "Stribeck speed", nested="guess")
+    delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0, nested="guess")
+
+    def torque_at(self, speed: Any) -> Any:
+        """Return the torque at `speed` >= 0."""
+        return self.torque * stribeck_share(speed, self.omega_s, self.delta)
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A change of the viscous slope at a speed."""
+
+    slope: Value = quantity("viscous", "change of the slope", nested=0.0)
+    speed: Value = quantity("speed", "speed at which the slope changes", nested="guess")
+
+    def torque_at(self, speed: Any) -> Any:
+        """Return the torque at `speed` >= 0."""
+        return self.slope * positive_part(speed - self.speed)
+
+
+@dataclass(frozen=True)
+class AddedFriction:
+    """Terms that are added to the magnitude of a law; any of them may differ by direction."""
+
+    coulomb: Value = quantity("torque", "added Coulomb friction", None)
+    viscous: Value = quantity("viscous", "added viscous friction", None)
+    quadratic: Value = quantity("quadratic", "added quadratic friction", None)
+    stribeck: StribeckRise | None = None
+    bend: Bend | None = None
+
+    def torque_at(self, speed: Any) -> Any:
+        """Return the torque at `speed` >= 0."""
+        plain = (self.coulomb, 1.0), (self.viscous, speed), (self.quadratic, speed * speed)
+        torque: Any = 0.0 * speed
+        for value, factor in plain:
+            torque = torque if value is None else torque + value * factor
+        for part in (self.stribeck, self.bend):
+            torque = torque if part is None else torque + part.torque_at(speed)
+        return torque
+
+
+@dataclass(frozen=True)
+class Sum(AbstractFrictionLaw):
+    """A static law and further terms."""
+
+    law: AbstractFrictionLaw = inline()
+    added: AddedFriction = AddedFriction()
+    name: ClassVar[str] = "sum"
+
+    def magnitude(self, speed: Any) -> Any:
+        return self.law.magnitude(speed) + self.added.torque_at(speed)
+
+    def weakening(self, speed: Any) -> Any:
+        return self.law.weakening(speed)
+
+
+@dataclass(frozen=True)
+class BristleSum(AbstractBristleLaw):
+    """A bristle law whose bristle also carries further terms."""
+
+    law: AbstractBristleLaw = inline()
+    added: AddedFriction = AddedFriction()
+    name: ClassVar[str] = "bristle_sum"
+
+    @property
+    def sigma0(self) -> Any:
+        """Bristle stiffness."""
+        return getattr(self.law, "sigma0")  # noqa: B009
+
+    @property
+    def sigma1(self) -> Any:
+        """Bristle damping."""
+        return getattr(self.law, "sigma1")  # noqa: B009
+
+    @property
+    def sigma2(self) -> Any:
+        """Viscous friction."""
+        return getattr(self.law, "sigma2")  # noqa: B009
+
+    def level(self, speed: Any) -> Any:
+        return self.law.level(speed) + self.added.torque_at(speed)
+
+    def weakening(self, speed: Any) -> Any:
+        return self.law.weakening(speed)
+
+
+@dataclass(frozen=True)
+class Bristle:
+    """Elastic contact before breakaway."""
+
+    sigma0: Value = quantity("stiffness", "bristle stiffness")
+    sigma1: Value = quantity("viscous", "bristle damping", 0.0)
+
+
+@dataclass(frozen=True)
+class Bristled(AbstractBristleLaw):
+    """A static law as the steady curve of a bristle; it becomes the static law as the bristle gets stiff.
+
+    The bristle carries all of it but the viscous part, if the law has a field of that name.
+    """
+
+    law: AbstractFrictionLaw = inline()
+    bristle: Bristle = Bristle(1.0)
+    name: ClassVar[str] = "bristled"
+
+    @property
+    def sigma0(self) -> Any:
+        """Bristle stiffness."""
+        return self.bristle.sigma0
+
+    @property
+    def sigma1(self) -> Any:
+        """Bristle damping."""
+        return self.bristle.sigma1
+
+    @property
+    def sigma2(self) -> Any:
+        """Viscous friction."""
+        return viscous_part(self.law)
+
+    def level(self, speed: Any) -> Any:
+        return self.law.magnitude(speed) - viscous_part(self.law) * speed
+
+    def weakening(self, speed: Any) -> Any:
+        return self.law.weakening(speed)
+
+
+def viscous_part(law: AbstractFrictionLaw) -> Any:
+    """Return the viscous friction of a static law, 0 where it has none of that name."""
+    return viscous_part(law.law) if isinstance(law, Sum) else getattr(law, "viscous", 0.0)
+
+
+def with_added(law: AbstractFrictionLaw, **terms: Any) -> AbstractFrictionLaw:
+    """Return a law with further terms; terms of the same name that it has already are replaced."""
+    if isinstance(law, (Sum, BristleSum)):
+        return replace(law, added=replace(law.added, **terms))
+    if isinstance(law, Bristled):
+        return replace(law, law=with_added(law.law, **terms))
+    if isinstance(law, AbstractBristleLaw):
+        return BristleSum(law, AddedFriction(**terms))
+    return Sum(law, AddedFriction(**terms))
+
+
+def with_bristle(law: AbstractFrictionLaw, bristle: Bristle) -> Bristled:
+    """Return a static law as the steady curve of a bristle."""
+    return Bristled(law, bristle)
+
+
+def plain_law(law: AbstractFrictionLaw) -> AbstractFrictionLaw:
+    """Return the law that was added to."""
+    return plain_law(law.law) if isinstance(law, (Sum, BristleSum, Bristled)) else law
+
+
+def added_terms(law: AbstractFrictionLaw) -> AddedFriction | None:
+    """Return the terms that were added to a law."""
+    if isinstance(law, Bristled):
+        return added_terms(law.law)
+    return law.added if isinstance(law, (Sum, BristleSum)) else None

@@ -1,0 +1,95 @@
+"""Figures of a diagnosis: where the gap is, what competes, traces before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from friction_ocp.plots.numbers import unit_text
+from friction_ocp.plots.palette import GRID, MEASURED, MUTED, RESIDUAL, SIMULATED
+from friction_ocp.plots.reading import Json, part, rows
+from friction_ocp.plots.series import Series
+from friction_ocp.plots.style import Figure, axes_grid, new_figure
+
+SHOWN = 8
+"""Candidates in the ranking."""
+GAINS = (
+    ("predicted_gain", "predicted", GRID),
+    ("refit_gain", "refitted", SIMULATED),
+    ("heldout_gain", "held out", MEASURED),
+)
+
+
+def diagnosis_figures(result: Json, before: Series, after: Series) -> Iterator[tuple[str, Figure]]:
+    """Yield name and figure of whatever the diagnosis has."""
+    cells = rows(part(result, "where"), "map")
+    if cells:
+        yield "gap-map", gap_map_figure(cells)
+    for k, item in enumerate(rows(result, "rounds")):
+        causes = rows(item, "causes")[:SHOWN]
+        if causes:
+            yield f"ranking-{k + 1}", ranking_figure(k + 1, causes)
+    units = part(result, "channel_units")
+    for recording, channels in before.items():
+        if channels:
+            yield f"before-after-{recording}", before_after_figure(recording, channels, after[recording], units)
+
+
+def gap_map_figure(cells: Sequence[Json]) -> Figure:
+    """Draw rms errors over the noise floor by channel and regime, before and after."""
+    labels = list(dict.fromkeys((str(cell["channel"]), str(cell["regime"])) for cell in cells))
+    figure = new_figure(1.2 + 0.32 * len(labels))
+    axes = axes_grid(figure, 1)[0][0]
+    for key, colour, shift in (("before", RESIDUAL, 0.19), ("after", MEASURED, -0.19)):
+        sizes = [_rms([float(cell[key]) for cell in cells if (cell["channel"], cell["regime"]) == at]) for at in labels]
+        axes.barh(np.arange(len(labels)) + shift, np.maximum(sizes, 1e-3), height=0.36, color=colour, label=key)
+    axes.set_yticks(np.arange(len(labels)), [f"{channel}: {regime}" for channel, regime in labels])
+    axes.axvline(1.0, color=MUTED, linewidth=1.0)
+    axes.set_xscale("log")
+    axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
+    axes.set_title("Where the gap is")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    axes.invert_yaxis()
+    return figure
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
+
+
+def ranking_figure(number: int, causes: Sequence[Json]) -> Figure:
+    """Draw the three gains of the best candidates of a round."""
+    figure = new_figure(1.3 + 0.5 * len(causes))
+    axes = axes_grid(figure, 1)[0][0]
+    places = np.arange(len(causes))
+    for k, (key, label, colour) in enumerate(GAINS):
+        gains = [float(cause.get(key) or 0.0) for cause in causes]
+        axes.barh(places + 0.26 * (k - 1), gains, height=0.24, color=colour, label=label)
+    names = [f"{cause['effect']} at {cause['component']} (p = {float(cause['probability']):.2g})" for cause in causes]
+    axes.set_yticks(places, names)
+    axes.set_xlabel("share of the excess error that the candidate takes away")
+    axes.set_title(f"What competes, round {number}")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    axes.axvline(0.0, color=MUTED, linewidth=1.0)
+    axes.invert_yaxis()
+    return figure
+
+
+def before_after_figure(
+    recording: str, before: Mapping[str, Any], after: Mapping[str, Any], units: Mapping[str, str]
+) -> Figure:
+    """Draw the residuals of every channel before and after the additions."""
+    figure = new_figure(0.6 + 2.2 * len(before))
+    figure.suptitle(f"{recording}: residuals of the free run", x=0.01, ha="left", fontweight="bold", fontsize=12)
+    grid = axes_grid(figure, len(before), sharex=True)
+    for axes, (name, channel) in zip((row[0] for row in grid), before.items(), strict=True):
+        for label, content, colour in (("before", channel, RESIDUAL), ("after", after[name], MEASURED)):
+            residual = np.asarray(content["measured"]) - np.asarray(content["simulated"])
+            axes.plot(content["time"], residual, color=colour, linewidth=0.9, label=label)
+        axes.set_title(name)
+        axes.set_ylabel(f"residual in {unit_text(units.get(name, ''))}")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    grid[-1][0].set_xlabel("time in s")
+    return figure

@@ -1,0 +1,89 @@
+"""The one page of a diagnosis; its figures are inside it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from friction_ocp.plots.numbers import plain, significant, unit_text
+from friction_ocp.plots.reading import Json, objects, part, rows
+from friction_ocp.report.diagnosis_words import alias_sentences, bias_sentences, diagnosis_sentence, round_sentence
+from friction_ocp.report.page import paragraphs, render_page
+from friction_ocp.whole_file import whole_file
+
+LISTED = 10
+"""Candidates in the table of a round."""
+
+
+def write_diagnosis_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
+    """Write report.html in one step; `figures` are PNG files by name."""
+    page = render_diagnosis(result, figures)
+    with whole_file(path) as staged:
+        staged.write_text(page, encoding="utf-8", newline="\n")
+
+
+def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
+    """Return the page."""
+    from markupsafe import Markup
+
+    def figure(name: str) -> Markup:
+        if name not in figures:
+            return Markup("")
+        data = base64.b64encode(figures[name].read_bytes()).decode()
+        return Markup('<p><img alt="{}" src="data:image/png;base64,{}"></p>').format(name, data)
+
+    gap, following = part(result, "gap"), result.get("next_experiment")
+    return render_page(
+        "diagnosis.html",
+        {
+            **{key: str(result.get(key) or "") for key in ("title", "problem", "verdict")},
+            "question": paragraphs(str(result.get("question") or "")),
+            "sentence": diagnosis_sentence(result),
+            "evaluated_on": rows(gap, "evaluated_on"),
+            "horizon": plain(gap["horizon_s"]) if gap.get("horizon_s") is not None else "",
+            "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
+            "rounds": [_round(item) for item in rows(result, "rounds")],
+            "aliases": alias_sentences(result),
+            "biased": bias_sentences(result),
+            "next": str(following["text"]) if following else "",
+            "traces": [name for name in figures if name.startswith("before-after-")],
+            "assumptions": rows(result, "assumptions"),
+            "figure": figure,
+        },
+    )
+
+
+def _gap_row(name: str, gap: Json) -> dict[str, str]:
+    before, after = objects(gap, "before")[name], objects(gap, "after")[name]
+    return {
+        "channel": name,
+        "rms_before": significant(before["rms"], 3),
+        "rms_after": significant(after["rms"], 3),
+        "unit": unit_text(str(before["unit"])),
+        "before": significant(before["noise_ratio"], 3),
+        "after": significant(after["noise_ratio"], 3),
+        "source": str(before["noise_source"]),
+    }
+
+
+def _round(item: Json) -> dict[str, Any]:
+    return {"sentence": round_sentence(item), "causes": [_cause(cause) for cause in rows(item, "causes")[:LISTED]]}
+
+
+def _cause(cause: Json) -> dict[str, str]:
+    values = part(cause, "parameters")
+    return {
+        "effect": str(cause["effect"]).replace("_", " "),
+        "component": str(cause["component"]),
+        "probability": significant(cause["probability"], 2),
+        "predicted": _gain(cause.get("predicted_gain")),
+        "refit": _gain(cause.get("refit_gain")),
+        "heldout": _gain(cause.get("heldout_gain")),
+        "parameters": ", ".join(f"{name} = {significant(value, 4)}" for name, value in values.items()),
+    }
+
+
+def _gain(value: float | None) -> str:
+    return "" if value is None else f"{value:.1%}"

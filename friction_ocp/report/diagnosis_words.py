@@ -1,0 +1,83 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friction_ocp.plots.numbers import percent, significant, unit_text
+from friction_ocp.plots.reading import Json, part, rows
+
+
+def diagnosis_sentence(result: Json) -> str:
+    """Say the verdict in one sentence or two."""
+    accepted = [_named(item) for item in rows(result, "accepted")]
+    closed = part(part(result, "gap"), "shrink")
+    match str(result.get("verdict")):
+        case "no_gap":
+            return "The model explains these recordings down to the noise: there is no gap to close."
+        case "explained":
+            return f"The model lacked {_listed(accepted)}; with it {_closed(closed)}."
+        case "undecided":
+            likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
+            return f"There is a gap, and several causes fit it: {likely}."
+        case _ if accepted:
+            found = f"The model lacked {_listed(accepted)}, with which {_closed(closed)}"
+            return f"{found}; what is left is more than noise, and nothing in the catalogue explains it."
+        case _:
+            return "There is a gap beyond the noise, and nothing in the catalogue explains it."
+
+
+def round_sentence(item: Json) -> str:
+    """Say what a round decided and how sure it is."""
+    chances = part(item, "probabilities")
+    rest = (
+        f"no effect {float(chances['no_effect']):.2g}, outside the catalogue {float(chances['outside_catalogue']):.2g}"
+    )
+    accepted = part(item, "accepted")
+    decided = f"Added: {_named(accepted)}." if accepted else "Nothing was added."
+    power = float(part(item, "excess")["ratio"])
+    return f"{decided} Power of the innovations over the noise before it: {power:.3g}. Probabilities: {rest}."
+
+
+def alias_sentences(result: Json) -> list[str]:
+    """Name the members of every alias set."""
+    return [" or ".join(_named(item) for item in members) for members in rows(result, "alias_sets")]
+
+
+def bias_sentences(result: Json) -> list[str]:
+    """Say by how much each biased parameter had been off."""
+    lines: list[str] = []
+    for item in rows(result, "biased_parameters"):
+        before, after = float(item["before"]), float(item["after"])
+        unit = unit_text(str(item.get("unit", "")))
+        off = (
+            f", {abs(before / after - 1.0):.0%} too {'high' if before > after else 'low'}" if after * before > 0 else ""
+        )
+        lines.append(f"{item['name']}: {significant(before, 4)} before, {significant(after, 4)} {unit} after{off}")
+    return lines
+
+
+def diagnosis_summary(result: Json) -> str:
+    """Return a diagnosis in a few lines of plain text."""
+    lines = [str(result["title"]), "", diagnosis_sentence(result), ""]
+    for number, item in enumerate(rows(result, "rounds"), 1):
+        lines.append(f"round {number}: {round_sentence(item)}")
+        for cause in rows(item, "causes")[:3]:
+            lines.append(f"  {_named(cause)}: probability {float(cause['probability']):.2g}")
+    lines += [f"cannot be told apart: {line}" for line in alias_sentences(result)]
+    lines += [f"biased before: {line}" for line in bias_sentences(result)]
+    following = result.get("next_experiment")
+    return "\n".join([*lines, str(following["text"])] if following else lines)
+
+
+def _named(item: Json) -> str:
+    return f"{str(item['effect']).replace('_', ' ')} at {item['component']}"
+
+
+def _closed(closed: Json) -> str:
+    low, high = (percent(float(end)) for end in closed["interval95"])
+    return f"{percent(float(closed['overall']))} of the excess error is gone ({low} to {high})"
+
+
+def _listed(items: Sequence[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else "nothing"

@@ -1,0 +1,71 @@
+"""Small drives of the plant with something that their model lacks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory, steps_and_multisine
+
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.recording import Channel, Recording
+
+SECONDS, STEP = 4.0, 2e-3
+TORQUE_CONSTANT, INERTIA, COULOMB, VISCOUS = 0.35, 0.002, 0.1, 1.5e-3
+ENCODER_STEP, CURRENT_NOISE = 2.0 * np.pi / 2**14, 0.005
+OFF = 1.04
+"""Factor by which the guesses of a problem are off."""
+
+
+def axis(**friction: Any) -> Plant:
+    """Return one mass; friction beyond Coulomb and viscous is what a model lacks."""
+    law = PlantFriction(**({"law": "coulomb_viscous", "tau_c": COULOMB, "viscous": VISCOUS} | friction))
+    return Plant(
+        shafts=(PlantShaft("motor", INERTIA, law),),
+        motors=(PlantMotor("motor", "motor", torque_constant=TORQUE_CONSTANT),),
+        sensors=(
+            PlantSensor("position", "motor.theta", period=STEP, resolution=ENCODER_STEP),
+            PlantSensor("current", "motor.current", period=STEP, noise_std=CURRENT_NOISE),
+        ),
+    )
+
+
+def record(plant: Plant, name: str, seed: int) -> Recording:
+    """Run a plant on a current that goes slow and fast, both ways."""
+    rng = np.random.default_rng(seed)
+    steps = steps_and_multisine(np.array([0.5, 1.0, 2.0]), (0.2, 0.6), 0.3, (0.5, 20.0), SECONDS, rng)
+    time = np.arange(0.0, SECONDS, STEP)
+    current = Trajectory(time, np.interp(time, np.asarray(steps.time), np.asarray(steps.value)), "zero")
+    run = plant.simulate(SECONDS, {"motor.current": current}, rng)
+    units = {"position": "rad", "current": "A"}
+    return Recording(name, {key: Channel(key, *run.channels[key], units[key]) for key in units})
+
+
+def write_case(folder: Path, plant: Plant, seed: int = 1) -> Path:
+    """Write three recordings and a problem whose model has Coulomb and viscous friction alone."""
+    for k, name in enumerate("abc"):
+        write_recording(record(plant, name, 10 * seed + k), folder / f"{name}.h5")
+    friction = {
+        "law": "coulomb_viscous",
+        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
+        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
+    }
+    inertia = {"guess": OFF * INERTIA, "min": 1e-4, "max": 0.1}
+    document = {
+        "format": "friction-ocp-problem/1",
+        "drive": {
+            "motor": {"torque_constant": TORQUE_CONSTANT},
+            "shafts": [{"name": "motor", "inertia": inertia, "friction": friction}],
+        },
+        "channels": {
+            "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": CURRENT_NOISE},
+            "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
+        },
+        "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
+        "diagnosis": {"effects": ["stribeck", "quadratic_drag", "asymmetry", "unbalance", "sensor_delay"]},
+    }
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path

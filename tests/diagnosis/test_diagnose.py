@@ -1,0 +1,78 @@
+"""Diagnosis from end to end on drives of the plant whose model lacks something, or nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnosis_cases import axis, write_case
+
+from friction_ocp.cli import main
+from friction_ocp.problem_file.load import load_problem
+
+RISE, STRIBECK_SPEED = 0.05, 6.0
+STRIBECK = {"law": "stribeck", "tau_s": 0.1 + RISE, "omega_s": STRIBECK_SPEED}
+
+
+@pytest.fixture(scope="module")
+def stribeck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """Return the output folder and the result document of a drive that lacks Stribeck friction."""
+    folder = tmp_path_factory.mktemp("stribeck")
+    path = write_case(folder, axis(**STRIBECK))
+    assert main(["diagnose", str(path), "--out", str(folder / "out")]) == 0
+    return folder / "out", json.loads((folder / "out" / "result.json").read_text(encoding="utf-8"))
+
+
+def test_what_is_missing_is_found_and_measured(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """Stribeck friction that the model lacks is named, its size and speed within a tenth."""
+    result = stribeck[1]
+    assert result["verdict"] == "explained"
+    (accepted,) = result["accepted"]
+    assert (accepted["effect"], accepted["component"]) == ("stribeck", "motor")
+    values = {name.rpartition(".")[2]: item["value"] for name, item in accepted["parameters"].items()}
+    assert values["torque"] == pytest.approx(RISE, rel=0.1)
+    assert values["omega_s"] == pytest.approx(STRIBECK_SPEED, rel=0.1)
+
+
+def test_the_document_holds_what_it_promises(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """Probabilities of a round sum to 1, the gap closes on validation, a parameter that stood in is named."""
+    result = stribeck[1]
+    for item in result["rounds"]:
+        total = sum(item["probabilities"].values()) + sum(cause["probability"] for cause in item["causes"])
+        assert total == pytest.approx(1.0)
+    assert result["gap"]["evaluated_on"] == ["c"]
+    low, high = result["gap"]["shrink"]["interval95"]
+    assert 0.8 < low <= result["gap"]["shrink"]["overall"] <= high <= 1.0
+    assert "motor.friction.viscous" in [item["name"] for item in result["biased_parameters"]]
+    assert result["remainder"]["significant"] is False
+
+
+def test_the_augmented_problem_is_a_problem(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """augmented.yaml loads and simulates as closely as the diagnosis says."""
+    folder, result = stribeck
+    problem = load_problem(folder / "augmented.yaml")
+    assert problem.drive.shaft("motor").friction.law.magnitude
+    assert main(["simulate", str(folder / "augmented.yaml"), "--out", str(folder / "simulated")]) == 0
+    simulated = json.loads((folder / "simulated" / "result.json").read_text(encoding="utf-8"))
+    ratio = simulated["fit"]["validation"]["position"]["noise_ratio"]
+    assert ratio == pytest.approx(result["gap"]["after"]["position"]["noise_ratio"], rel=0.05)
+
+
+def test_files_for_people(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """The page says the verdict, and every figure is there twice."""
+    folder, _ = stribeck
+    assert "The model lacked stribeck at motor" in (folder / "report.html").read_text(encoding="utf-8")
+    assert (folder / "result.h5").exists()
+    for name in ("gap-map", "ranking-1", "before-after-c"):
+        assert (folder / "figures" / f"{name}.png").exists() and (folder / "figures" / f"{name}.svg").exists()
+
+
+def test_a_model_that_lacks_nothing_has_no_gap(tmp_path: Path) -> None:
+    """Nothing is found where nothing is missing."""
+    path = write_case(tmp_path, axis())
+    assert main(["diagnose", str(path), "--out", str(tmp_path / "out")]) == 0
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "no_gap"
+    assert result["accepted"] == [] and result["biased_parameters"] == []

@@ -1,0 +1,54 @@
+"""The linearised program against the solver's own normal equations and against a simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnosis_cases import axis, write_case
+
+from friction_ocp.diagnosis.blocks import blocks_of, score
+from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out
+from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.model import prepare
+from friction_ocp.problem_file.load import load_problem
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> FittedModel:
+    """Return the base model of a drive that lacks nothing, fitted."""
+    return fit_base(prepare(load_problem(write_case(tmp_path_factory.mktemp("axis"), axis()))))
+
+
+def test_rows_give_the_normal_equations_of_the_solver(fitted: FittedModel) -> None:
+    """J'J and J'r of the rows are Hessian and gradient with the nodes eliminated."""
+    linear = fitted.linear
+    reduced = reduce_system(linear.program.linearise(linear.point), 0.0)
+    rows = linear.rows
+    scale = np.sqrt(np.diag(reduced.hessian))
+    assert np.allclose(
+        rows.jacobian.T @ rows.jacobian / np.outer(scale, scale), reduced.hessian / np.outer(scale, scale), atol=1e-6
+    )
+    gradient = rows.jacobian.T @ rows.residual
+    assert np.allclose(gradient / scale, reduced.gradient / scale, atol=1e-4 * np.sqrt(fitted.objective))
+
+
+def test_innovations_of_a_right_model_are_noise(fitted: FittedModel) -> None:
+    """Twice the objective is no more than the number of samples: floors and process noise are not too small."""
+    samples = int(np.sum(fitted.linear.rows.channel >= 0))
+    assert fitted.objective < 0.5 * samples * 1.1
+
+
+def test_held_out_costs_exceed_those_of_the_fit(fitted: FittedModel) -> None:
+    """A recording that took no part in a fit costs a little more than one that did, and of the same order."""
+    costs = float(np.sum(held_out(fitted)))
+    assert fitted.objective <= costs * (1.0 + 1e-6) < 1.2 * fitted.objective
+
+
+def test_the_score_test_keeps_its_level(fitted: FittedModel) -> None:
+    """Columns that have nothing to do with the residuals get p-values that are uniform, not small."""
+    rows, blocks = fitted.linear.rows, blocks_of(fitted.linear.rows)
+    rng = np.random.default_rng(0)
+    smooth = np.cumsum(rng.standard_normal((rows.residual.size, 60)), axis=0)
+    values = [score(rows, blocks, rows.absorbed(column[:, None])).p_value for column in smooth.T]
+    assert np.mean(np.array(values) < 0.05) < 0.2
+    assert np.median(values) > 0.2

@@ -1,0 +1,62 @@
+"""Laws put together: each gives back the law it was made from, and carries its terms where it should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from friction_ocp.friction.bristle import LuGre
+from friction_ocp.friction.composite import (
+    Bend,
+    Bristle,
+    StribeckRise,
+    added_terms,
+    plain_law,
+    with_added,
+    with_bristle,
+)
+from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.static import CoulombViscous, Polyline, Quadratic, Stribeck
+from friction_ocp.parameters import Directional
+
+SPEED = np.linspace(0.0, 9.0, 50)
+BASE = CoulombViscous(1.0, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("terms", "whole"),
+    [
+        ({"stribeck": StribeckRise(0.5, 2.0, 1.3)}, Stribeck(1.0, 1.5, 2.0, 0.2, 1.3)),
+        ({"quadratic": 0.03}, Quadratic(1.0, 0.2, 0.03)),
+        ({"bend": Bend(-0.15, 4.0)}, Polyline(1.0, (0.2, 0.05), (4.0,))),
+        ({"coulomb": 0.1, "viscous": 0.3}, CoulombViscous(1.1, 0.5)),
+    ],
+    ids=["stribeck", "quadratic", "bend", "plain"],
+)
+def test_added_terms_make_the_laws_that_have_them(terms: dict[str, object], whole: AbstractFrictionLaw) -> None:
+    """Coulomb and viscous friction with a further term is the law of the catalogue that has that term."""
+    assert np.allclose(with_added(BASE, **terms).magnitude(SPEED), whole.magnitude(SPEED), rtol=0, atol=1e-14)
+
+
+def test_terms_come_together_and_come_apart() -> None:
+    """Terms added one after another stand side by side, also under a bristle, and the plain law is still there."""
+    law = with_added(with_bristle(with_added(BASE, quadratic=0.03), Bristle(50.0)), coulomb=0.1)
+    assert plain_law(law) is BASE
+    terms = added_terms(law)
+    assert terms is not None and (terms.quadratic, terms.coulomb) == (0.03, 0.1)
+    assert np.allclose(law.magnitude(SPEED), 1.1 + (0.2 + 0.03 * SPEED) * SPEED, rtol=1e-14)
+
+
+def test_a_bristle_under_a_static_law_is_lugre() -> None:
+    """A Stribeck law under a bristle has level, viscous part and stiffness of the LuGre law of the same numbers."""
+    law, lugre = with_bristle(Stribeck(1.0, 1.5, 2.0, 0.2), Bristle(50.0, 0.7)), LuGre(1.0, 1.5, 2.0, 50.0, 0.7, 0.2)
+    assert np.allclose(law.level(SPEED), lugre.level(SPEED), rtol=1e-14)
+    assert (law.sigma0, law.sigma1, law.sigma2) == (lugre.sigma0, lugre.sigma1, lugre.sigma2)
+
+
+def test_terms_on_a_bristle_law_are_carried_by_its_bristle() -> None:
+    """What is added to LuGre raises the level at which its bristle slips."""
+    lugre = LuGre(1.0, 1.5, 2.0, 50.0, 0.7, 0.2)
+    law = with_added(lugre, coulomb=Directional(0.3, -0.3)).along("negative")
+    assert np.allclose(law.magnitude(SPEED), lugre.magnitude(SPEED) - 0.3, rtol=1e-14)
+    assert law.has_bristle
