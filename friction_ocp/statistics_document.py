@@ -160,6 +160,9 @@ def comparison_document(found: Comparison) -> dict[str, Any]:
         "format": COMPARE_FORMAT,
         "status": "converged" if converged else "not_converged",
         "title": f"{len(found.candidates)} models of the same recordings",
+        "problem": ", ".join(
+            item.estimate.problem.path.name for item in found.candidates if item.estimate.problem.path
+        ),
         "warnings": [*found.warnings, *(f"{best.name}: {warning}" for warning in document["warnings"])],
         "compare": {
             "ranked_by": found.ranked_by,

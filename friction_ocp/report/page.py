@@ -15,7 +15,7 @@ from friction_ocp.plots.numbers import plain
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
-from friction_ocp.report.statistics import statistic_section, whole_verdict
+from friction_ocp.report.statistics import drawn_section, whole_verdict
 from friction_ocp.report.tables import SPLITS, correlation_rows, fit_rows, fit_rows_by_recording, parameter_rows
 from friction_ocp.whole_file import whole_file
 
@@ -53,7 +53,7 @@ def render_report(result: Json, series: Series) -> str:
             "question": paragraphs(str(result.get("question") or "")),
             "converged": result.get("status") == "converged",
             "verdict": whole_verdict(result),
-            "statistic": statistic_section(result),
+            "statistic": drawn_section(result),
             "warnings": rows(result, "warnings"),
             "parameters": parameter_rows(objects(result, "parameters")),
             "horizon": plain(part(result, "fit").get("horizon_s")),

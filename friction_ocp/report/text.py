@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from friction_ocp.report.statistics import statistic_section, table_lines, whole_verdict
+from friction_ocp.report.section import table_lines
+from friction_ocp.report.statistics import statistic_section, whole_verdict
 
 
 def summary(result: Mapping[str, Any]) -> str:
     """Return warnings, parameter table and free-run errors of a result document; of a statistic, its tables."""
     lines = [result["title"], ""]
-    statistic = statistic_section(result, with_figure=False)
+    statistic = statistic_section(result)
     if result["parameters"]:
         lines += [whole_verdict(result), ""]
     lines += [f"! {warning}" for warning in result["warnings"]]
