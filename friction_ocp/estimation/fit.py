@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
@@ -14,7 +12,7 @@ from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, joined, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.estimation.starts import start_points
 
 EXPECTED_PHASES = 16
 
@@ -26,23 +24,12 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     windows, where free runs are asked for: from short predictions and, unless that ends at the noise and the friction
     has no part that is hard to start, from the best ends of a fit on relaxed segments.
     """
-    phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
-    starts = [within_reach(model, start) for start in start_points(model)]
+    options = model.problem.estimation
+    phases = Phases(progress, EXPECTED_PHASES * options.starts)
+    starts = [within_reach(model, start) for start in start_points(model.space, options.starts, options.seed)]
     models = [replace(model, space=model.space.moved(start)) for start in starts]
     best = min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)
     return detour(model, best, phases)
-
-
-def start_points(model: Model) -> list[FloatArray]:
-    """Return the guess and, for more than one start, random points within a factor sqrt(10) of it (seeded)."""
-    options, space = model.problem.estimation, model.space
-    rng = np.random.default_rng(options.seed)
-    points = [space.guess]
-    for _ in range(options.starts - 1):
-        factor = 10.0 ** rng.uniform(-0.5, 0.5, space.guess.size)
-        shift = rng.uniform(-1.0, 1.0, space.guess.size) * space.scale
-        points.append(space.clip(np.where(space.guess != 0, space.guess * factor, shift)))
-    return points
 
 
 def _fit_once(model: Model, phases: Phases) -> Fitted:

@@ -9,7 +9,7 @@ import pytest
 from axes import axis, measured_axis, problem, still_recording
 
 from friction_ocp.estimation.estimate import identify
-from friction_ocp.estimation.fit import fit, start_points
+from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.release import RELEASES, SHARES, released
@@ -28,18 +28,6 @@ STRIBECK = Stribeck(
 def stribeck() -> Model:
     """A model whose Stribeck part is released from a nested one."""
     return prepare(problem(axis(STRIBECK), still_recording()))
-
-
-def test_random_starts_lie_within_a_factor_of_the_guess(stribeck: Model) -> None:
-    """The first start is the guess; the others lie within sqrt(10) of it, repeat with the seed and differ."""
-    options = replace(stribeck.problem.estimation, starts=8, seed=3)
-    model = replace(stribeck, problem=replace(stribeck.problem, estimation=options))
-    first, *others = start_points(model)
-    assert first == pytest.approx(model.space.guess)
-    ratios = np.log10(np.array(others) / model.space.guess)
-    assert np.all(np.abs(ratios) <= 0.5 + 1e-12)
-    assert np.array(start_points(model)) == pytest.approx(np.array([first, *others]))
-    assert len(np.unique(np.array(others)[:, 0])) == len(others)
 
 
 def test_the_nested_model_has_no_stribeck_part(stribeck: Model) -> None:
