@@ -15,6 +15,7 @@ from friction_ocp.estimation.curves import FrictionCurve
 from friction_ocp.estimation.estimate import Estimate, ParameterEstimate, Simulation
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.score import Errors, FreeRun
+from friction_ocp.estimation.static_points import StaticFit
 from friction_ocp.estimation.whiteness import Whiteness
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries, StateSeries
@@ -89,6 +90,7 @@ def _heading(problem: Problem) -> dict[str, Any]:
         "recordings": {
             "train": [use.name for use in problem.train],
             "validation": [use.name for use in problem.validation],
+            "static": [use.name for use in (*problem.static, *problem.static_validation)],
         },
     }
 
@@ -123,6 +125,20 @@ def _fit(simulation: Simulation) -> dict[str, Any]:
         "horizon_s": simulation.horizon_s,
         "train": table(simulation.train_errors),
         "validation": table(simulation.validation_errors),
+        "static": {item.name: _static(item) for item in simulation.static},
+    }
+
+
+def _static(item: StaticFit) -> dict[str, Any]:
+    """Return static points beside their prediction."""
+    return {
+        "split": item.split,
+        "measures": item.effort,
+        "unit": item.unit,
+        "rms": _number(item.rms),
+        "noise_ratio": _number(item.noise_ratio),
+        "noise_source": item.noise_source,
+        **{key: _numbers(getattr(item, key)) for key in ("speed", "measured", "predicted", "std_error")},
     }
 
 
@@ -173,7 +189,8 @@ def provenance(problem: Problem) -> dict[str, Any]:
         "python": platform.python_version(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "seed": problem.estimation.seed,
-        "recordings": {use.name: use.recording.sha256 for use in problem.recordings},
+        "recordings": {use.name: use.recording.sha256 for use in problem.recordings}
+        | {use.name: use.points.sha256 for use in (*problem.static, *problem.static_validation)},
     }
 
 

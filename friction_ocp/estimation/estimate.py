@@ -25,6 +25,7 @@ from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
+from friction_ocp.estimation.static_points import StaticFit, static_fit
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, whiteness
@@ -74,6 +75,8 @@ class Simulation:
     horizon_s: float | None
     max_step: float
     """Longest integrator step that was used, s."""
+    static: tuple[StaticFit, ...] = ()
+    """Static points, those that were fitted first."""
 
 
 @dataclass(frozen=True)
@@ -193,6 +196,10 @@ def simulate_model(model: Model, theta: FloatArray) -> Simulation:
         state_names=model.drive.state_names,
         horizon_s=horizon(model),
         max_step=model.max_step,
+        static=(
+            *(static_fit(term, model.space, theta, "train") for term in model.static),
+            *(static_fit(term, model.space, theta, "validation") for term in model.static_validation),
+        ),
     )
 
 

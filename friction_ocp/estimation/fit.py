@@ -8,6 +8,7 @@ from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.points_fit import fit_points
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, joined, staged, windowed
@@ -26,6 +27,8 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     """
     options = model.problem.estimation
     phases = Phases(progress, EXPECTED_PHASES * options.starts)
+    if not model.train:
+        return Fitted(*fit_points(model, phases.begin("static points")))
     starts = [within_reach(model, start) for start in start_points(model.space, options.starts, options.seed)]
     models = [replace(model, space=model.space.moved(start)) for start in starts]
     best = min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 
@@ -24,9 +26,9 @@ class Influence:
     curvature: FloatArray
     """(rows,) the weight of each row in the information matrix."""
     recording: IntArray
-    """(rows,) index of the recording."""
+    """(rows,) index of the recording; static points count on behind the recordings."""
     time: FloatArray
-    """(rows,) s."""
+    """(rows,) s; the index of a static point."""
     prior: FloatArray
     """(parameters, parameters) information from priors."""
 
@@ -43,10 +45,18 @@ def influence(program: Program, point: Point) -> Influence:
         _of_recording(program, point, index, reduced.recordings[index].by_theta)
         for index in range(len(program.experiments))
     ]
+    parts += [_of_points(term, program.space, point.theta) for term in program.static]
     jacobian, residual, weight, curvature, time = (np.concatenate(column) for column in zip(*parts, strict=True))
     recording = np.concatenate([np.full(part[1].size, index) for index, part in enumerate(parts)])
     pull = np.where(np.isfinite(program.space.prior_std), program.space.prior_std, np.inf) ** -2.0
     return Influence(jacobian, residual, weight, curvature, recording, time, np.diag(pull))
+
+
+def _of_points(
+    term: StaticTerm, space: ParameterSpace, theta: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    errors, slope = term.residuals(space, theta)
+    return slope, errors, errors, np.ones(errors.size), np.arange(errors.size, dtype=np.float64)
 
 
 def _of_recording(

@@ -16,6 +16,7 @@ from friction_ocp.estimation.experiment import Experiment, experiment, with_inpu
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.sweep import Sweep
 
@@ -56,6 +57,9 @@ class Model:
     """How fast each shaft turns in the training recordings, by its name."""
     max_step: float
     """Longest integrator step, s."""
+    static: tuple[StaticTerm, ...] = ()
+    """Static points that are fitted."""
+    static_validation: tuple[StaticTerm, ...] = ()
 
     @property
     def noise(self) -> FloatArray:
@@ -76,7 +80,10 @@ def prepare(problem: Problem) -> Model:
     experiments = [use for use in uses if isinstance(use, Experiment)]
     train = tuple(experiments[: len(problem.train)])
     floors = {channel.name: noise_floor(channel, _signals(problem, channel.name)) for channel in problem.drive.outputs}
-    states = np.concatenate([_suggested(sweep, space, item) for item in train])
+    states = np.concatenate(
+        [np.zeros((0, len(drive.state_names))), *(_suggested(sweep, space, item) for item in train)]
+    )
+    static = tuple(static_term(use, problem.drive, space) for use in problem.static)
     return Model(
         problem=problem,
         drive=drive,
@@ -85,10 +92,12 @@ def prepare(problem: Problem) -> Model:
         train=train,
         validation=tuple(experiments[len(problem.train) :]),
         floors=floors,
-        speed_scale=_speed_scale(drive, states),
+        speed_scale=_speed_scale(drive, states) if train else _scale_of_points(drive, static),
         state_scale=_state_scale(states),
         speeds=_speeds(drive, space, problem, states),
         max_step=max_step,
+        static=static,
+        static_validation=tuple(static_term(use, problem.drive, space) for use in problem.static_validation),
     )
 
 
@@ -153,8 +162,17 @@ def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment) -> FloatAr
     return np.asarray(value).T
 
 
+def _scale_of_points(drive: SteppedDrive, static: tuple[StaticTerm, ...]) -> FloatArray:
+    """Return the speed scale where there are static points alone: their typical speed for every group."""
+    speeds = np.concatenate([term.speed for term in static])
+    typical = float(np.sqrt(np.mean(speeds**2))) or 1.0
+    scale = np.ones(len(drive.mechanism.topology.roots) + 1)
+    scale[:-1] = typical
+    return scale
+
+
 def _state_scale(states: FloatArray) -> FloatArray:
-    spread = np.std(states, axis=0)
+    spread = np.std(states, axis=0) if states.size else np.zeros_like(states, shape=states.shape[1:])
     return np.where(spread > 0, spread, 1.0)
 
 
@@ -197,6 +215,8 @@ def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem
 
 def slowest_period(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
     """Return the period, s, of the slowest oscillation at the guesses; infinite where nothing oscillates."""
+    if not problem.train:
+        return np.inf
     use = problem.train[0]
     typical = [_typical(use, name) for name in drive.input_names]
     frequencies = np.abs(_rates(drive, space.numbers(space.guess, use.name), typical).imag)

@@ -11,7 +11,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
-from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import parse, resolve_ties
 from friction_ocp.parameters import Free, Leaf, Tie
 from friction_ocp.simulation.grid import BoolArray, FloatArray
@@ -79,12 +79,12 @@ def parameter_space(
     free = {path: value for path, value in values.items() if isinstance(value, Free)}
     entries: list[tuple[str, Free]] = []
     for path, value in free.items():
-        owners = [use.name for use in problem.train if path not in use.set] if value.scope == "recording" else [""]
+        owners = [use.name for use in problem.fitted if path not in use.set] if value.scope == "recording" else [""]
         entries += [(f"{path}@{owner}" if owner else path, value) for owner in owners]
     names = tuple(name for name, _ in entries)
     theta = ca.SX.sym("theta", len(names))
     symbols = {name: theta[k] for k, name in enumerate(names)}
-    tables = {use.name: _table(problem.drive, values, symbols, use) for use in problem.recordings}
+    tables = {use.name: _table(problem.drive, values, symbols, use) for use in problem.uses}
     leaf_vectors = {name: ca.vertcat(*[ca.SX(table[leaf]) for leaf in leaf_names]) for name, table in tables.items()}
     active = _active(leaf_vectors, theta) if active is None else active
     maps = {
@@ -105,13 +105,13 @@ def parameter_space(
         leaf_names=tuple(leaf_names),
         active=active,
         maps=maps,
-        constraints=_constraints(problem, tables[problem.train[0].name], theta),
+        constraints=_constraints(problem, tables[problem.fitted[0].name], theta),
         **{key: np.asarray(column, dtype=float) for key, column in fields.items()},
     )
 
 
 def _table(
-    drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse
+    drive: Drive, values: Mapping[str, object], symbols: Mapping[str, ca.SX], use: RecordingUse | StaticUse
 ) -> dict[str, Any]:
     """Return every number of the drive in one recording: fixed, fitted or tied."""
     table: dict[str, Any] = {}

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.recording.recording import Recording
+from friction_ocp.recording.static_points import StaticPoints
 
 Fit = Literal["simulation", "relaxed"]
 Solver = Literal["gauss_newton", "ipopt"]
@@ -23,11 +24,29 @@ class RecordingUse:
     recording: Recording
     set: Mapping[str, float] = field(default_factory=dict[str, float])
     """Values by parameter path, in SI units."""
+    place: str = ""
+    """Where the problem file names it, such as recordings.train[0]."""
 
     @property
     def name(self) -> str:
         """Name of the recording in results."""
         return self.recording.name
+
+
+@dataclass(frozen=True)
+class StaticUse:
+    """Static points and the numbers of the drive that are known but differ in them."""
+
+    points: StaticPoints
+    set: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Values by parameter path, in SI units."""
+    place: str = ""
+    """Where the problem file names them."""
+
+    @property
+    def name(self) -> str:
+        """Name of the points in results."""
+        return self.points.name
 
 
 @dataclass(frozen=True)
@@ -60,6 +79,9 @@ class Problem:
     drive: Drive
     train: tuple[RecordingUse, ...]
     validation: tuple[RecordingUse, ...] = ()
+    static: tuple[StaticUse, ...] = ()
+    """Static points that are fitted together with the training recordings, or alone."""
+    static_validation: tuple[StaticUse, ...] = ()
     estimation: EstimationOptions = EstimationOptions()
     constraints: tuple[str, ...] = ()
     question: str = ""
@@ -74,3 +96,13 @@ class Problem:
     def recordings(self) -> tuple[RecordingUse, ...]:
         """All recordings, training first."""
         return self.train + self.validation
+
+    @property
+    def fitted(self) -> tuple[RecordingUse | StaticUse, ...]:
+        """All that is fitted: training recordings and static points."""
+        return self.train + self.static
+
+    @property
+    def uses(self) -> tuple[RecordingUse | StaticUse, ...]:
+        """All recordings and static points, those that are fitted first."""
+        return self.fitted + self.validation + self.static_validation

@@ -15,6 +15,7 @@ from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 from friction_ocp.simulation.kernel import SweepRequest, SweepResult
 from friction_ocp.simulation.sweep import Sweep
@@ -94,6 +95,8 @@ class Program:
     width: FloatArray
     """(groups + 1,) smoothing of the sign by group and of backlash corners; zeros are exact."""
     loss: AbstractLoss = Squares()
+    static: tuple[StaticTerm, ...] = ()
+    """Static points: residuals of the parameters alone, always squared."""
 
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement."""
@@ -142,7 +145,7 @@ class Program:
 
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
-        total = _prior_cost(self.space, point.theta)
+        total = _prior_cost(self.space, point.theta) + self._static_cost(point.theta)
         results = self.simulate_all(point)
         for index, (item, cut) in enumerate(zip(self.experiments, self.segments, strict=True)):
             result = results[index]
@@ -151,6 +154,9 @@ class Program:
             total += float(np.sum(cost)) + self._gap_cost(cut, point.nodes[index], result.end)
             total += self._start_cost(index, point)
         return total if np.isfinite(total) else np.inf
+
+    def _static_cost(self, theta: FloatArray) -> float:
+        return sum(term.cost(self.space, theta) for term in self.static)
 
     def _gap_cost(self, cut: Segments, nodes: FloatArray, end: FloatArray) -> float:
         if cut.gap_weight is None or cut.count < 2:
@@ -175,6 +181,11 @@ class Program:
         pull = np.where(np.isfinite(self.space.prior_std), pull, 0.0)
         hessian += np.diag(pull)
         gradient += pull * (point.theta - self.space.prior_mean)
+        for term in self.static:
+            errors, slope = term.residuals(self.space, point.theta)
+            total += 0.5 * float(errors @ errors)
+            hessian += slope.T @ slope
+            gradient += slope.T @ errors
         blocks: list[Blocks] = []
         for index, result in enumerate(self.simulate_all(point, derivatives=True)):
             cost, by_theta, slope, block = self._linearise_recording(index, point, result)

@@ -36,6 +36,7 @@ def program_of(
         noise=model.noise,
         width=width * model.speed_scale,
         loss=loss,
+        static=model.static,
     )
 
 

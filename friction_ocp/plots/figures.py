@@ -12,6 +12,7 @@ from friction_ocp.plots.comparison import comparison_figure
 from friction_ocp.plots.correlation import correlation_figure
 from friction_ocp.plots.curves import friction_figures
 from friction_ocp.plots.overview import overview_figure
+from friction_ocp.plots.points import points_figure
 from friction_ocp.plots.profiles import profiles_figure
 from friction_ocp.plots.reading import objects, part, rows
 from friction_ocp.plots.series import Series
@@ -42,6 +43,8 @@ def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, F
         for recording, channels in series.items()
         if channels
     )
+    static = objects(part(result, "fit"), "static")
+    yield from ((f"points-{name}", points_figure(name, points)) for name, points in static.items())
     yield from ((f"friction-{shaft}", figure) for shaft, figure in friction_figures(rows(result, "friction_curves")))
     if any(objects(result, "residuals").values()):
         yield "residual-autocorrelation", whiteness_figure(objects(result, "residuals"))

@@ -7,7 +7,16 @@ from itertools import chain
 
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.problem_file.rules import dissipation, excitation, recordings, signals, structure, terms, values
+from friction_ocp.problem_file.rules import (
+    dissipation,
+    excitation,
+    recordings,
+    signals,
+    static,
+    structure,
+    terms,
+    values,
+)
 from friction_ocp.problem_file.rules.case import Case, Rule
 
 _PARTS = (*structure.STRUCTURE, *signals.SIGNALS, *values.VALUES, *dissipation.DISSIPATION, *terms.TERMS)
@@ -19,7 +28,7 @@ WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 
 def check(problem: Problem) -> tuple[Finding, ...]:
     """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file."""
-    doubts = (*recordings.RECORDINGS, *excitation.EXCITATION)
+    doubts = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
     return _run(Case(problem), (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
 
 
@@ -28,10 +37,10 @@ def check_file(problem: Problem) -> tuple[Finding, ...]:
     return _errors(_run(Case(problem), MODEL, WHOLE))
 
 
-def check_rest(problem: Problem, recording_places: tuple[str, ...], complete: bool) -> tuple[Finding, ...]:
+def check_rest(problem: Problem, complete: bool) -> tuple[Finding, ...]:
     """Return the errors of what is left of a problem; `complete` if only recordings were taken out."""
     whole = WHOLE if complete else ()
-    return _errors(_run(Case(problem, recording_places), (*MODEL, *recordings.RECORDINGS), whole))
+    return _errors(_run(Case(problem), (*MODEL, *recordings.RECORDINGS, *static.STATIC), whole))
 
 
 def _run(case: Case, rules: Iterable[Rule], if_named: Iterable[Rule]) -> tuple[Finding, ...]:

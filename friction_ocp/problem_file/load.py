@@ -6,16 +6,20 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.problem_file.check import check, check_file, check_rest
 from friction_ocp.problem_file.document import Document, read_document
 from friction_ocp.problem_file.salvage import read_section, salvage
 from friction_ocp.problem_file.schema import ProblemSection
-from friction_ocp.recording.hdf5 import read_recording
+from friction_ocp.recording.hdf5 import is_static_points, read_recording, read_static_points
 from friction_ocp.recording.recording import Recording
+from friction_ocp.recording.static_points import StaticPoints
+
+Use = RecordingUse | StaticUse
+AnyUse = TypeVar("AnyUse", RecordingUse, StaticUse)
 
 
 @dataclass(frozen=True)
@@ -48,19 +52,20 @@ def load_problem(path: str | Path) -> Problem:
         raise FrictionOcpError(findings)
     problem = _build(rest, uses, document)
     if findings:
-        places = tuple(entry.place for entry, _ in uses)
-        raise FrictionOcpError([*findings, *check_rest(problem, places, complete=section is not None)])
+        raise FrictionOcpError([*findings, *check_rest(problem, complete=section is not None)])
     if check_file(problem):
         raise FrictionOcpError([finding for finding in check(problem) if finding.severity == "error"])
     return problem
 
 
-def _build(section: ProblemSection, uses: list[tuple[_Entry, RecordingUse]], document: Document) -> Problem:
+def _build(section: ProblemSection, uses: list[tuple[_Entry, Use]], document: Document) -> Problem:
     return Problem(
         title=section.title or document.path.stem,
         drive=section.build_drive(),
-        train=tuple(use for entry, use in uses if entry.kind == "train"),
-        validation=tuple(use for entry, use in uses if entry.kind == "validation"),
+        train=_of_kind(uses, "train", RecordingUse),
+        validation=_of_kind(uses, "validation", RecordingUse),
+        static=_of_kind(uses, "train", StaticUse),
+        static_validation=_of_kind(uses, "validation", StaticUse),
         estimation=section.estimation.build(),
         constraints=tuple(section.constraints),
         question=document.head,
@@ -70,18 +75,24 @@ def _build(section: ProblemSection, uses: list[tuple[_Entry, RecordingUse]], doc
     )
 
 
-def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, RecordingUse]], list[Finding]]:
-    """Read every recording that the file lists, each file once."""
+def _of_kind(uses: list[tuple[_Entry, Use]], kind: str, form: type[AnyUse]) -> tuple[AnyUse, ...]:
+    return tuple(use for entry, use in uses if entry.kind == kind and isinstance(use, form))
+
+
+def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, Use]], list[Finding]]:
+    """Read every recording and all static points that the file lists, each file once."""
     findings: list[Finding] = []
-    uses: list[tuple[_Entry, RecordingUse]] = []
-    known: dict[Path, Recording | FrictionOcpError] = {}
+    uses: list[tuple[_Entry, Use]] = []
+    known: dict[Path, Recording | StaticPoints | FrictionOcpError] = {}
     for entry in _entries(document.content):
         path = recording_path(document.path, entry.file)
         if path not in known:
             known[path] = _read(path)
         recording = known[path]
         if isinstance(recording, Recording):
-            uses.append((entry, RecordingUse(recording, entry.set)))
+            uses.append((entry, RecordingUse(recording, entry.set, entry.place)))
+        elif isinstance(recording, StaticPoints):
+            uses.append((entry, StaticUse(recording, entry.set, entry.place)))
         else:
             place = f"{document.path}: {entry.place}"
             findings += [
@@ -90,9 +101,9 @@ def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, RecordingUs
     return uses, findings
 
 
-def _read(path: Path) -> Recording | FrictionOcpError:
+def _read(path: Path) -> Recording | StaticPoints | FrictionOcpError:
     try:
-        return read_recording(path)
+        return read_static_points(path) if is_static_points(path) else read_recording(path)
     except FrictionOcpError as error:
         return error
 

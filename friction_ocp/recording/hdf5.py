@@ -94,6 +94,16 @@ def read_static_points(path: str | Path) -> StaticPoints:
     return points
 
 
+def is_static_points(path: str | Path) -> bool:
+    """Return whether a file says that it holds static points; False also where it cannot be read."""
+    try:
+        with h5py.File(path, "r") as file:
+            stated = file.attrs.get("format", "")
+    except OSError:
+        return False
+    return str(stated.decode() if isinstance(stated, bytes) else stated) == STATIC_FORMAT
+
+
 def write_static_points(points: StaticPoints, path: str | Path) -> None:
     """Write static points whole or not at all."""
     _raise(check_static_points(points, str(path)) + check_attributes(points.attributes, str(path)))

@@ -16,7 +16,14 @@ from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
 from friction_ocp.report.statistics import drawn_section, whole_verdict
-from friction_ocp.report.tables import SPLITS, correlation_rows, fit_rows, fit_rows_by_recording, parameter_rows
+from friction_ocp.report.tables import (
+    SPLITS,
+    correlation_rows,
+    fit_rows,
+    fit_rows_by_recording,
+    parameter_rows,
+    static_rows,
+)
 from friction_ocp.whole_file import whole_file
 
 _HERE = Path(__file__).parent
@@ -59,6 +66,7 @@ def render_report(result: Json, series: Series) -> str:
             "horizon": plain(part(result, "fit").get("horizon_s")),
             "whole": part(result, "fit").get("horizon_s") is None,
             "fit": fit_rows(part(result, "fit")),
+            "static": static_rows(part(result, "fit")),
             "parts": fit_rows_by_recording(part(result, "fit")),
             "recordings": _recordings(result, series),
             "friction": friction,

@@ -130,6 +130,14 @@ def fit_rows_by_recording(fit: Json) -> dict[str, list[FitRow]]:
     return table
 
 
+def static_rows(fit: Json) -> list[FitRow]:
+    """Return the row of each set of static points."""
+    return [
+        _fit_row(f"{name}: {points.get('measures')} ({SPLITS.get(str(points.get('split')), '')})", points)
+        for name, points in objects(fit, "static").items()
+    ]
+
+
 def _fit_row(recordings: str, errors: Json) -> FitRow:
     return FitRow(
         recordings=recordings,

@@ -15,7 +15,7 @@ from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import resolve_ties
 from friction_ocp.parameters import Free, Leaf, Tie, leaves
 from friction_ocp.recording.conditioning import smooth_motion
@@ -41,8 +41,6 @@ class Case:
     """A problem and what the rules derive from it, each only once."""
 
     problem: Problem
-    recording_places: tuple[str, ...] = ()
-    """Where the recordings stand in the file, if some of those there could not be read."""
 
     @cached_property
     def drive(self) -> Drive:
@@ -139,12 +137,20 @@ class Case:
 
     def uses(self) -> Iterator[tuple[str, RecordingUse]]:
         """Yield every recording, training first, and where it stands in the file."""
-        problem = self.problem
-        places = self.recording_places or (
-            *(f"recordings.train[{k}]" for k in range(len(problem.train))),
-            *(f"recordings.validation[{k}]" for k in range(len(problem.validation))),
-        )
-        yield from zip(places, problem.recordings, strict=True)
+        for kind, uses in (("train", self.problem.train), ("validation", self.problem.validation)):
+            for k, use in enumerate(uses):
+                yield use.place or f"recordings.{kind}[{k}]", use
+
+    def static_uses(self) -> Iterator[tuple[str, StaticUse]]:
+        """Yield all static points, those that are fitted first, and where they stand in the file."""
+        for kind, uses in (("train", self.problem.static), ("validation", self.problem.static_validation)):
+            for k, use in enumerate(uses):
+                yield use.place or f"recordings.{kind}[{k}]", use
+
+    @property
+    def has_points_alone(self) -> bool:
+        """Whether nothing is simulated: static points are fitted, and there is no recording."""
+        return bool(self.problem.static) and not self.problem.recordings
 
     def at_recording(self, place: str, use: RecordingUse) -> str:
         """Return file, place and recording, as findings name them."""

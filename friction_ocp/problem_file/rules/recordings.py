@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.problem import RecordingUse, StaticUse
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 from friction_ocp.problem_file.rules.power import contradicts
@@ -31,17 +33,21 @@ def recordings_are_sound(case: Case) -> Iterator[Finding]:
 def recordings_have_names_of_their_own(case: Case) -> Iterator[Finding]:
     """Results are filed by the name of the recording, and a held-out recording is not trained on."""
     first: dict[str, tuple[str, str]] = {}
-    for place, use in case.uses():
-        file = str(use.recording.path or use.name)
+    for place, use in (*case.uses(), *case.static_uses()):
+        file = str(_path(use) or use.name)
         other, other_file = first.setdefault(use.name, (place, file))
         if other == place:
             continue
-        where = case.at_recording(place, use)
+        where = case.at(f"{place}: {file}")
         if file != other_file:
             yield Finding(where, f"'{use.name}' is also the name of {other}", remedy="rename one of the files")
         else:
             what = f"this file also stands in {other}"
             yield Finding(where, what, remedy="validate on a recording that is not trained on", severity="warning")
+
+
+def _path(use: RecordingUse | StaticUse) -> Path | None:
+    return use.recording.path if isinstance(use, RecordingUse) else use.points.path
 
 
 def recordings_have_the_channels(case: Case) -> Iterator[Finding]:

@@ -89,7 +89,8 @@ def motors_are_driven(case: Case) -> Iterator[Finding]:
     """Each motor follows a measured current, torque or voltage, a commanded current, or the controller."""
     drive = case.drive
     for k, motor in enumerate(drive.motors):
-        if not ways_of_driving(drive, motor) and not is_prescribed(drive):
+        driven = ways_of_driving(drive, motor) or is_prescribed(drive) or case.has_points_alone
+        if not driven:
             allowed = (
                 f"an input channel for {motor.name}.current, .current_command, .torque or .voltage, or a controller"
             )
@@ -98,7 +99,7 @@ def motors_are_driven(case: Case) -> Iterator[Finding]:
 
 def something_moves_the_drive(case: Case) -> Iterator[Finding]:
     """Without a motor or a prescribed motion only a free decay is left."""
-    if not case.drive.motors and not is_prescribed(case.drive):
+    if not case.drive.motors and not is_prescribed(case.drive) and not case.has_points_alone:
         what = "there is no motor, and no input prescribes the motion of a shaft"
         remedy = "add drive.motor unless the recordings show a free decay"
         yield Finding(case.at("drive"), what, remedy=remedy, severity="warning")
@@ -140,7 +141,7 @@ def motor_outputs_can_be_predicted(case: Case) -> Iterator[Finding]:
 
 def something_is_predicted(case: Case) -> Iterator[Finding]:
     """A fit compares at least one output channel."""
-    if not case.drive.outputs:
+    if not case.drive.outputs and not case.has_points_alone:
         names = ", ".join(channel.name for channel in case.drive.channels)
         what = f"no channel is an output ({names} are inputs)" if names else "there are no channels"
         yield Finding(case.at("channels"), what, "at least one output, such as {measures: motor.theta}")

@@ -153,7 +153,7 @@ def _unresolved(case: Case, ties: Mapping[str, str], plain: Mapping[str, float])
 def constraints_compare_numbers(case: Case) -> Iterator[Finding]:
     """A constraint is an inequality between numbers that exist."""
     scoped = [path for path, value, _ in _fitted(case) if value.scope == "recording"]
-    names = [*case.leaves, *(f"{path}@{use.name}" for path in scoped for use in case.problem.train)]
+    names = [*case.leaves, *(f"{path}@{use.name}" for path in scoped for use in case.problem.fitted)]
     for k, text in enumerate(case.problem.constraints):
         where = case.at(f"constraints[{k}]")
         try:
@@ -165,7 +165,7 @@ def constraints_compare_numbers(case: Case) -> Iterator[Finding]:
 
 def settings_name_numbers(case: Case) -> Iterator[Finding]:
     """What is `set` beside a recording is a number of the drive."""
-    for place, use in case.uses():
+    for place, use in (*case.uses(), *case.static_uses()):
         for path in use.set:
             if path not in case.leaves:
                 where, names = case.at(f"{place}.set"), list(case.leaves)
