@@ -14,6 +14,7 @@ import casadi as ca
 from friction_ocp.drive.kick import Unknown, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism
 from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.torques import applied_torques
 
 Effort = Literal["torque", "current"]
 
@@ -36,14 +37,29 @@ def reference_shaft(drive: Drive) -> str:
 def steady_drive(drive: Drive, effort: Effort) -> SteadyDrive:
     """Return the effort that each motor's command has at constant speed, so that all together overcome the friction.
 
-    A motor takes its `share` of the command, so that equal motors get their mean. Gravity counts at the angle.
+    A motor takes its `share` of the command, so that equal motors get their mean. Gravity counts at the angle; waves
+    over the angle average out over whole turns, and the drive is as at the start of its warm-up.
     """
-    stiff = tuple(replace(item, stiffness=None, damping=0.0, backlash=0.0) for item in drive.transmissions)
-    mech = mechanism(replace(drive, transmissions=stiff, controller=None, channels=()))
+    mech = mechanism(_averaged(drive))
     omega, theta = ca.SX.sym("omega"), ca.SX.sym("theta")
     value = _balanced(mech, reference_shaft(drive), effort, omega, theta)
     numbers = column(list(mech.parameters.values()))
     return SteadyDrive(ca.Function("effort", [omega, theta, numbers], [value]), tuple(mech.parameters))
+
+
+def _averaged(drive: Drive) -> Drive:
+    """Return the drive without springs, play, waves, warm-up and anything that is recorded."""
+    return replace(
+        drive,
+        shafts=tuple(
+            replace(item, disturbance=None, friction=replace(item.friction, ripple=None, warm_up=None))
+            for item in drive.shafts
+        ),
+        transmissions=tuple(replace(item, stiffness=None, damping=0.0, backlash=0.0) for item in drive.transmissions),
+        motors=tuple(replace(item, cogging=None, torque_ripple=None) for item in drive.motors),
+        controller=None,
+        channels=(),
+    )
 
 
 def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: ca.SX) -> ca.SX:
@@ -56,7 +72,7 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
     joints = mech.loaded_joints()
     symbols = ca.SX.sym("unknown", len(joints) + 1)
     load: dict[str, Any] = {joint.name: symbols[k] for k, joint in enumerate(joints)}
-    torques = mech.applied_torques(Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0)), 0.0)
+    torques = applied_torques(mech, Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0)), 0.0)
     friction = {
         item.name: item.friction.torque(mech.shaft_speed(item.name, speeds), transmitted_torque(mech, item, load))
         for item in mech.drive.shafts

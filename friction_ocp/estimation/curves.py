@@ -12,8 +12,8 @@ from friction_ocp.drive.mechanism import Mechanism, Motion
 from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.drive.steady import reference_shaft
 from friction_ocp.drive.topology import topology
-from friction_ocp.drive.values import bind_drive
 from friction_ocp.drive.torques import elastic_torque
+from friction_ocp.drive.values import bind_drive
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.score import FreeRun
 from friction_ocp.friction.smoothing import smooth_abs
