@@ -1,0 +1,128 @@
+"""Two motors on one bull gear, and the one chain on half of it that stands for them; a motor that is stopped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from leighton import (
+    FAST_STIFFNESS,
+    LOAD_INERTIA,
+    MOTOR_INERTIA,
+    RATIO,
+    SLEW,
+    STIFFNESS,
+    TORQUE_CONSTANT,
+    fast_polyline,
+    lumped,
+    slow_friction,
+    stop,
+)
+from plant import Plant, PlantMotor, PlantShaft, PlantTransmission, Trajectory
+from twin import Bench, Run, Twin, drive_of, worst
+
+from friction_ocp.drive.parts import Drive
+
+ROUNDING = 1e-9
+STOPS = 4e-3
+"""Relative error of steps of 1 ms where the load comes to rest within one, on a joint of 39 rad/s."""
+
+
+def two_chains(backlash: float = 0.0) -> Plant:
+    """Return both motors on the whole structure; friction of the gear twice that of one chain."""
+    shafts = (
+        PlantShaft("east", MOTOR_INERTIA, fast_polyline()),
+        PlantShaft("west", MOTOR_INERTIA, fast_polyline()),
+        PlantShaft("load", LOAD_INERTIA, slow_friction(chains=2)),
+    )
+    joints = tuple(PlantTransmission(side, "load", RATIO, STIFFNESS, 0.0, backlash) for side in ("east", "west"))
+    motors = tuple(PlantMotor(side, side, "current", TORQUE_CONSTANT) for side in ("east", "west"))
+    return Plant(shafts, joints, motors)
+
+
+def run_of(plant: Plant, inputs: dict[str, Trajectory | float], duration: float, initial: dict[str, float]) -> Run:
+    drive: Drive = drive_of(plant, inputs)
+    return Bench(drive).run(duration, inputs, initial)
+
+
+def turning(*motors: str) -> dict[str, float]:
+    """Return the start at full speed, the springs not stretched."""
+    return {f"{name}.omega": SLEW for name in motors} | {"load.omega": SLEW / RATIO}
+
+
+def test_two_chains_and_one_on_half_the_load_stop_alike() -> None:
+    """Stopped together, both motors leave the load the motion that one chain gives to half of it (eq. 13, Fig. 10a)."""
+    profile = stop(1.0, 4.0)
+    start = {"load.omega": SLEW / RATIO}
+    whole = run_of(two_chains(), {"east.omega": profile, "west.omega": profile}, 4.0, start)
+    half = run_of(lumped(fast_polyline(), slow_friction()), {"motor.omega": profile}, 4.0, start)
+    for signal in ("load.theta", "load.omega"):
+        assert whole[signal] == pytest.approx(half[signal], abs=ROUNDING * np.max(np.abs(half[signal])))
+
+
+def test_equal_currents_make_them_agree_and_unequal_ones_only_the_load() -> None:
+    """A bias between the motors winds the springs against each other; the load moves as under the mean current."""
+    swing = Trajectory(np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 2.5, -2.5, 1.0]), "linear")
+    half = run_of(lumped(fast_polyline(), slow_friction()), {"motor.current": swing}, 4.0, {})
+    both = run_of(two_chains(), {"east.current": swing, "west.current": swing}, 4.0, {})
+    for signal in ("load.theta", "load.omega"):
+        assert both[signal] == pytest.approx(half[signal], abs=ROUNDING * np.max(np.abs(half[signal])))
+    sides = {
+        name: Trajectory(swing.time, swing.value + bias, "linear") for name, bias in (("east", 0.2), ("west", -0.2))
+    }
+    biased = run_of(two_chains(), {f"{name}.current": side for name, side in sides.items()}, 4.0, {})
+    moving = np.abs(half["load.omega"]) > 0.2 * np.max(np.abs(half["load.omega"]))
+    deviation = np.abs(biased["load.omega"] - half["load.omega"])[moving]
+    between_breaks = 0.05
+    assert np.max(deviation) < between_breaks * np.max(np.abs(half["load.omega"]))
+    assert np.max(np.abs(biased["east.theta"] - biased["west.theta"])) > 0.0
+
+
+@pytest.mark.parametrize(("bias", "taken_up"), [(2.5, True), (0.0, False)])
+def test_a_bias_takes_up_the_backlash(bias: float, taken_up: bool) -> None:
+    """With the motors pulled apart the load reverses without a dead zone; without a bias it waits in the play."""
+    backlash = 4e-5
+    swing = Trajectory(np.array([0.0, 2.0, 4.0]), np.array([1.0, 1.0, -1.0]), "linear")
+
+    def reversal(play: float) -> np.ndarray:
+        sides = {"east.current": bias, "west.current": -bias}
+        inputs = {name: Trajectory(swing.time, swing.value + shift, "linear") for name, shift in sides.items()}
+        return run_of(two_chains(play), inputs, 4.0, {})["load.theta"]
+
+    tight, loose = reversal(0.0), reversal(backlash)
+    drift = np.ptp((loose - tight)[2000:])
+    assert (drift < 0.1 * backlash) == taken_up
+
+
+def test_the_stepped_drive_follows_the_plant_through_a_stop() -> None:
+    """A motor stopped kinematically within 10 ms leaves the load ringing at 6.2 Hz, until it sticks."""
+    plant = replace(lumped(fast_polyline(), slow_friction()), motors=())
+    twin = Twin(plant, {"motor.omega": stop(0.5, 4.0)})
+    truth, run = twin.run(4.0, {"load.omega": SLEW / RATIO})
+    assert worst(truth, run, "load.omega") < STOPS
+    ringing = run["load.omega"][520:1800]
+    crossings = np.flatnonzero(np.diff(np.sign(ringing)) != 0)
+    frequency = 0.5 / (1e-3 * np.mean(np.diff(crossings)))
+    assert frequency == pytest.approx(np.sqrt(2.0 * STIFFNESS / LOAD_INERTIA) / (2.0 * np.pi), rel=0.02)
+    assert frequency == pytest.approx(6.24, abs=0.1)
+
+
+def test_the_spring_of_the_fast_side_is_a_fast_mode_without_visible_effect() -> None:
+    """Table 1's 2.11e4 N m/rad with 0.002 kg m^2 rings at 517 Hz; the load's stop hardly changes."""
+    shafts = (
+        PlantShaft("motor", MOTOR_INERTIA, fast_polyline()),
+        PlantShaft("reducer", MOTOR_INERTIA),
+        PlantShaft("load", 0.5 * LOAD_INERTIA, slow_friction()),
+    )
+    joints = (
+        PlantTransmission("motor", "reducer", 1.0, FAST_STIFFNESS, 1.0),
+        PlantTransmission("reducer", "load", RATIO, STIFFNESS),
+    )
+    profile = stop(0.5, 3.0)
+    start = {"load.omega": SLEW / RATIO, "reducer.omega": SLEW}
+    fast = Bench(drive_of(Plant(shafts, joints), {"motor.omega": profile}))
+    with_spring = fast.run(3.0, {"motor.omega": profile}, start, step=5e-5)
+    without = run_of(lumped(fast_polyline(), slow_friction()), {"motor.omega": profile}, 3.0, start)
+    assert np.sqrt(FAST_STIFFNESS / MOTOR_INERTIA) / (2.0 * np.pi) == pytest.approx(517, abs=1)
+    assert worst(without, with_spring, "load.omega") < STOPS
