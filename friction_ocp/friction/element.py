@@ -139,13 +139,20 @@ class FrictionElement:
 
     def steady_deflection(self, omega: Any) -> Any:
         """Return the deflection of a bristle, or those of several, in steady motion, rounded at standstill."""
+        return smooth_sign(omega, 0.1 * getattr(self.law.along("positive"), "omega_s", 1.0)) * self._bent(omega)
+
+    def bent_deflection(self, omega: Any) -> Any:
+        """Return the deflection, or those of several bristles, that belongs to steady motion at `omega`."""
+        return smooth_sign(omega, 0.0) * self._bent(omega)
+
+    def _bent(self, omega: Any) -> Any:
+        """Return the size of steady deflections in the direction of `omega`."""
         if isinstance(self.law, AbstractMaxwellSlip):
-            reach = [where(omega >= 0, item.forward.reach, item.backward.reach) for item in self._plays(omega, 0.0)]
-            return _stacked([smooth_sign(omega, 0.1 * getattr(self.law, "omega_s", 1.0)) * one for one in reach])
+            plays = self._plays(omega, 0.0)
+            return _stacked([where(omega >= 0, item.forward.reach, item.backward.reach) for item in plays])
         (_, positive), (_, negative) = self._bristles()
         level = where(omega >= 0, positive.level(smooth_abs(omega)), negative.level(smooth_abs(omega)))
-        omega_s = getattr(positive, "omega_s", 1.0)
-        return smooth_sign(omega, 0.1 * omega_s) * level / self._sigma(0, omega)
+        return level / self._sigma(0, omega)
 
     def step_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
         """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""

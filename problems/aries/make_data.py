@@ -33,7 +33,9 @@ SPEEDS = np.geomspace(1.11e-5, 4.45e-2, 30)
 POSITIONS = np.radians([0.0, 30.0, 60.0, -30.0, -60.0])
 PASSES, SLOW_LOG, FAST_LOG = 4, 1e-2, 1e-3
 SWING = 0.2
-"""Deviation of the speed over its mean from which a run is a limit cycle; logged speeds are those over half a second."""
+"""Deviation of the speed over its mean from which a run is a limit cycle."""
+SPEED_NOISE = 0.05
+"""Noise of the speed over its mean that the angle is averaged down to, to see the swing."""
 SOURCE = "problems/aries/make_data.py"
 
 
@@ -57,7 +59,9 @@ def averages(log: dict[str, tuple[np.ndarray, np.ndarray]]) -> tuple[float, floa
     """Return mean speed and mean torque of the second half of a log, and the swing of its speed over the mean."""
     time, position = log["position"]
     late = time > 0.5 * time[-1]
-    block = 50
+    mean_speed = abs(position[late][-1] - position[late][0]) / (time[late][-1] - time[late][0])
+    noise = np.sqrt(2.0) * aries.LOG_NOISE / (SPEED_NOISE * SLOW_LOG * max(mean_speed, 1e-6))
+    block = int(np.clip(np.ceil(noise ** (2.0 / 3.0)), 2, 100))
     angle = position[late][: late.sum() // block * block].reshape(-1, block).mean(axis=1)
     speeds = np.diff(angle) / (block * SLOW_LOG)
     mean = float(np.mean(speeds))
