@@ -1,4 +1,4 @@
-"""The R.A. axis of the ARIES 50/80 cm Schmidt telescope as the plant has it: the numbers of its paper, and a loop for it."""
+"""The R.A. axis of the ARIES 50/80 cm Schmidt telescope as the plant has it, from its paper, and a loop for it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NUMBERS = {
 """Tables 1 and 2, east to west (positive) and west to east; delta = 0.85 as found there."""
 DELTA = 0.85
 KP, KI, SAMPLE_TIME = 2.0e5, 4.0e6, 5e-3
-"""Gains of the speed loop, N m s/rad and N m/rad: stable at speed, and a limit cycle where friction falls with speed."""
+"""Gains of the speed loop, N m s/rad and N m/rad: stable at speed, a limit cycle where friction falls with it."""
 LOOP_STEP = 0.0115 * ARCSEC
 """rad; the incremental encoder behind the friction roller, 4.608e6 x 24.5 counts a turn."""
 LOG_NOISE, TORQUE_NOISE = 0.05 * ARCSEC, 1.0

@@ -15,8 +15,7 @@ from friction_ocp.dae import Dae, Linearisation
 from friction_ocp.drive.dae_form import dae
 from friction_ocp.drive.mechanism import deflection_names
 from friction_ocp.drive.parts import Drive, Shaft
-from friction_ocp.drive.steady import reference_shaft
-from friction_ocp.drive.topology import topology
+from friction_ocp.drive.steady import steady_speeds
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.static import NoFriction
@@ -78,8 +77,8 @@ class LinearDrive:
     def response(self, frequency: FloatArray) -> ComplexArray:
         """Return (frequencies, outputs, inputs) the frequency response at frequencies in Hz."""
         m, still = self.matrices, np.eye(len(self.state_names))
-        points = [m.c @ np.linalg.solve(2j * np.pi * f * still - m.a, m.b) + m.d for f in frequency]
-        return np.array(points, dtype=np.complex128)
+        s = 2j * np.pi * frequency[:, None, None]
+        return (m.c @ np.linalg.solve(s * still - m.a, m.b[None]) + m.d).astype(np.complex128)
 
     def between(self, source: str, target: str, frequency: FloatArray) -> ComplexArray:
         """Return (frequencies,) the response of one output to one input."""
@@ -87,7 +86,7 @@ class LinearDrive:
 
 
 def linearise(drive: Drive, speed: float = 0.0, at: Mapping[str, float] | None = None) -> LinearDrive:
-    """Linearise a drive with plain numbers while its motor's shaft turns at `speed`, bristles as steady motion bends them.
+    """Linearise a drive with plain numbers while its motor's shaft turns at `speed`, its bristles bent accordingly.
 
     `at` gives states, inputs and torques through rigid joints by name where they are something else; springs are not
     stretched and inputs zero unless it says so.
@@ -114,15 +113,10 @@ def without_friction(drive: Drive) -> Drive:
 
 def _steady_motion(drive: Drive, speed: float) -> dict[str, float]:
     """Return the states of a drive that turns evenly."""
-    stiff = tuple(replace(item, stiffness=None) for item in drive.transmissions)
-    joined = topology(replace(drive, transmissions=stiff))
-    reference = reference_shaft(drive)
     states: dict[str, float] = {}
-    for shaft in drive.shafts:
-        if joined.group_of[shaft.name] == joined.group_of[reference]:
-            omega = speed * float(joined.speed_ratio[shaft.name] / joined.speed_ratio[reference])
-            states[f"{shaft.name}.omega"] = omega
-            states |= zip(deflection_names(shaft), _deflections(shaft, omega), strict=True)
+    for name, ratio in steady_speeds(drive).items():
+        states[f"{name}.omega"] = speed * ratio
+        states |= zip(deflection_names(drive.shaft(name)), _deflections(drive.shaft(name), speed * ratio), strict=True)
     return states
 
 
@@ -131,7 +125,6 @@ def _deflections(shaft: Shaft, omega: float) -> list[float]:
         return []
     if omega == 0.0:
         return [0.0] * shaft.friction.law.bristle_count
-    # the steady deflection is rounded near standstill; scaled to the fully bent one, it is exact at any speed
     bent = np.asarray(ca.DM(ca.SX(shaft.friction.bent_deflection(ca.SX(omega)))), dtype=float)
     return [float(one) for one in bent.ravel()]
 

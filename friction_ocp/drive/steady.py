@@ -14,6 +14,7 @@ import casadi as ca
 from friction_ocp.drive.kick import Unknown, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism
 from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.topology import topology
 from friction_ocp.drive.torques import applied_torques
 
 Effort = Literal["torque", "current"]
@@ -32,6 +33,15 @@ class SteadyDrive:
 def reference_shaft(drive: Drive) -> str:
     """Return the shaft whose speed steady points state: that of the first motor, else the first one."""
     return drive.motors[0].shaft if drive.motors else drive.shafts[0].name
+
+
+def steady_speeds(drive: Drive) -> dict[str, float]:
+    """Return the speed of every shaft of a drive with plain numbers over that of the reference shaft."""
+    stiff = tuple(replace(item, stiffness=None) for item in drive.transmissions)
+    joined = topology(replace(drive, transmissions=stiff))
+    reference = reference_shaft(drive)
+    members = joined.members(joined.group_of[reference])
+    return {name: float(joined.speed_ratio[name] / joined.speed_ratio[reference]) for name in members}
 
 
 def steady_drive(drive: Drive, effort: Effort) -> SteadyDrive:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -10,10 +10,7 @@ import numpy as np
 from friction_ocp.drive.kick import transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion
 from friction_ocp.drive.parts import Shaft, Transmission
-from friction_ocp.drive.steady import reference_shaft
-from friction_ocp.drive.topology import topology
 from friction_ocp.drive.torques import elastic_torque
-from friction_ocp.drive.values import bind_drive
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.score import FreeRun
 from friction_ocp.friction.smoothing import smooth_abs
@@ -47,7 +44,11 @@ def friction_curves(
     for shaft in mech.drive.shafts:
         if isinstance(shaft.friction.law, NoFriction):
             continue
-        fastest = max(_fastest(mech, shaft.name, runs), _fastest_point(model, shaft, theta)) or 1.0
+        reached = [
+            _fastest(mech, shaft.name, runs),
+            *(item.top for name, item in model.speeds.items() if name == shaft.name),
+        ]
+        fastest = max(reached) or 1.0
         for load in _loads(model, shaft, theta, runs):
             curves.append(_curve(model, shaft, theta, covariance, fastest, load))
     return tuple(curves)
@@ -61,21 +62,6 @@ def _fastest(mech: Mechanism, name: str, runs: tuple[FreeRun, ...]) -> float:
     speed = max(float(np.max(np.abs(run.states[:, column]))) for run in runs)
     ratio = mech.topology.speed_ratio[name]
     return speed * (1.0 if isinstance(ratio, ca.SX) else abs(float(ratio)))
-
-
-def _fastest_point(model: Model, shaft: Shaft, theta: FloatArray) -> float:
-    """Return the greatest speed of a shaft over all static points, through springs as if they were rigid."""
-    if not model.static:
-        return 0.0
-    drive = model.problem.drive
-    values = dict(zip(model.space.leaf_names, model.space.numbers(theta, model.static[0].name), strict=True))
-    bound = bind_drive(drive, values)
-    joined = topology(replace(bound, transmissions=tuple(replace(t, stiffness=None) for t in bound.transmissions)))
-    reference = reference_shaft(drive)
-    if joined.group_of[shaft.name] != joined.group_of[reference]:
-        return 0.0
-    ratio = abs(float(joined.speed_ratio[shaft.name] / joined.speed_ratio[reference]))
-    return ratio * max(float(np.max(np.abs(term.speed))) for term in model.static)
 
 
 def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, ...]) -> list[float]:

@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.steady import steady_speeds
 from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
@@ -54,7 +56,7 @@ class Model:
     state_scale: FloatArray
     """(states,) typical size of each state."""
     speeds: Mapping[str, SpeedRange]
-    """How fast each shaft turns in the training recordings, by its name."""
+    """How fast each shaft turns in training recordings and static points, by its name."""
     max_step: float
     """Longest integrator step, s."""
     static: tuple[StaticTerm, ...] = ()
@@ -94,7 +96,7 @@ def prepare(problem: Problem) -> Model:
         floors=floors,
         speed_scale=_speed_scale(drive, states) if train else _scale_of_points(drive, static),
         state_scale=_state_scale(states),
-        speeds=_speeds(drive, space, problem, states),
+        speeds=_wider(_speeds(drive, space, problem, states), _speeds_of_points(space, problem, static)),
         max_step=max_step,
         static=static,
         static_validation=tuple(static_term(use, problem.drive, space) for use in problem.static_validation),
@@ -188,6 +190,8 @@ def _speed_scale(drive: SteppedDrive, states: FloatArray) -> FloatArray:
 
 def _speeds(drive: SteppedDrive, space: ParameterSpace, problem: Problem, states: FloatArray) -> dict[str, SpeedRange]:
     """Return the range of speeds of every shaft whose speed is a state."""
+    if not problem.train:
+        return {}
     mech = drive.mechanism
     numbers = space.numbers(space.guess, problem.train[0].name)
     first, ranges = len(mech.angle_groups), dict[str, SpeedRange]()
@@ -199,6 +203,26 @@ def _speeds(drive: SteppedDrive, space: ParameterSpace, problem: Problem, states
         for name, ratio in zip(names, np.abs(np.asarray(by_name)).ravel(), strict=True):
             ranges[name] = SpeedRange(float(np.sqrt(np.mean(speed**2)) * ratio), float(np.max(speed) * ratio))
     return ranges
+
+
+def _speeds_of_points(space: ParameterSpace, problem: Problem, static: tuple[StaticTerm, ...]) -> dict[str, SpeedRange]:
+    """Return the range of speeds of every shaft over all static points, through springs as if they were rigid."""
+    if not static:
+        return {}
+    numbers = dict(zip(space.leaf_names, space.numbers(space.guess, static[0].name), strict=True))
+    speed = np.abs(np.concatenate([term.speed for term in static]))
+    typical, top = float(np.sqrt(np.mean(speed**2))), float(np.max(speed))
+    ratios = steady_speeds(bind_drive(problem.drive, numbers))
+    return {name: SpeedRange(abs(ratio) * typical, abs(ratio) * top) for name, ratio in ratios.items()}
+
+
+def _wider(first: dict[str, SpeedRange], second: dict[str, SpeedRange]) -> dict[str, SpeedRange]:
+    """Return for every shaft the larger of two typical and of two top speeds."""
+    both = {name: [table[name] for table in (first, second) if name in table] for name in {**first, **second}}
+    return {
+        name: SpeedRange(max(item.typical for item in items), max(item.top for item in items))
+        for name, items in both.items()
+    }
 
 
 def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:

@@ -1,10 +1,10 @@
-"""Make data/aries: the R.A. axis of the ARIES Schmidt telescope as the plant of the tests has it, numbers of its paper.
+"""Make data/aries: the R.A. axis of the ARIES Schmidt telescope as the plant of the tests has it, from its paper.
 
-python problems/aries/make_data.py [--seed 1] [--only PART]. Torque noise 1 N m, encoder 0.05 arcsec. The speed loop is an
-incremental PI at 5 ms with the gains of tests/aries.py. Parts:
+python problems/aries/make_data.py [--seed 1] [--only PART]. Torque noise 1 N m, encoder 0.05 arcsec. The speed loop is
+an incremental PI at 5 ms with the gains of tests/aries.py. Parts:
 
-curve: 30 speeds x 5 positions x 4 passes x 2 directions under the loop, 10 ms logs, averaged over the second half of a run.
-A run whose speed swings by more than a fifth of its mean is a limit cycle: `curve_<direction>.h5` leaves it out,
+curve: 30 speeds x 5 positions x 4 passes x 2 directions under the loop, 10 ms logs, averaged over the second half of a
+run. A run whose speed swings by more than a fifth of its mean is a limit cycle: `curve_<direction>.h5` leaves it out,
 `curve_all_<direction>.h5` averages it too, as the paper does.
 responses: torque steps and a slow ramp at 1 ms, a step logged at 10 ms, a slow loop below breakaway, and speed runs.
 """

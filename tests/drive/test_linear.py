@@ -67,7 +67,7 @@ def test_the_steady_slope_is_that_of_the_stribeck_curve() -> None:
 
 
 def test_the_typical_shaft_of_the_leighton_telescope() -> None:
-    """Eqs. 3, 4 (Fig. 8): motor and load, each an inertia with the slope of its friction, on a spring behind the ratio."""
+    """Eqs. 3, 4 (Fig. 8): two inertias, each with the slope of its friction, on a spring behind the ratio."""
     plant = leighton.lumped(leighton.fast_polyline(), leighton.slow_friction())
     s = 2j * np.pi * FREQUENCY
     n, k = leighton.RATIO, leighton.STIFFNESS
