@@ -39,9 +39,11 @@ def statistic_document(statistic: Statistic) -> dict[str, Any]:
 def multistart_document(found: MultiStart) -> dict[str, Any]:
     """Return every start with its end, and what ends are the same optimum."""
     names = [item.name for item in found.estimate.parameters]
+    document = estimate_document(found.estimate)
     return {
-        **estimate_document(found.estimate),
+        **document,
         "format": MULTISTART_FORMAT,
+        "warnings": [*found.warnings, *document["warnings"]],
         "multistart": {
             "same_objective": SAME_OBJECTIVE,
             "same_parameter": SAME_PARAMETER,

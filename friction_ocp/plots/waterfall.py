@@ -12,6 +12,7 @@ from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
 
 _LOWEST = 1e-8  # relative excess that is drawn as none
 _NO_OPTIMUM = MUTED
+_TICKS = (-30.0, -10.0, -3.0, -1.0, -0.3, 0.0, 0.1, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0)
 
 
 def waterfall_figure(multistart: Json, parameters: Mapping[str, Json]) -> Figure:
@@ -68,8 +69,11 @@ def _draw_parameters(axes: Axes, ended: Sequence[Json], names: Sequence[str]) ->
             axes.plot([part(start, "start")[name] / scale], [row], "|", color=MUTED, markersize=11, zorder=4)
             axes.plot([part(start, "end")[name] / scale], [row], "o", color=_stroke(start), markersize=6, alpha=0.85)
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
+    low, high = axes.get_xlim()
+    axes.set_xticks([tick for tick in _TICKS if low <= tick <= high], minor=False)
+    axes.set_xticks([], minor=True)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.axvline(1.0, color=MUTED, linewidth=1.0)
+    axes.axvline(1.0, color=MUTED, linewidth=1.0, zorder=0)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")

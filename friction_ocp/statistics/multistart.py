@@ -52,6 +52,24 @@ class MultiStart:
         count = 1 + max(end.cluster for end in self.ends if end.cluster is not None)
         return tuple(tuple(k for k, end in enumerate(self.ends) if end.cluster == j) for j in range(count))
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Starts that failed, and ends as good as the best at other parameters."""
+        texts: list[str] = []
+        errors = [end.error for end in self.ends if end.error]
+        if errors:
+            texts.append(f"{len(errors)} of {len(self.ends)} starts failed, the first with: {errors[0]}.")
+        lowest = min(_objective(end.optimum) for end in self.ends)
+        near = [
+            end for end in self.ends if end.cluster and _objective(end.optimum) - lowest <= SAME_OBJECTIVE * abs(lowest)
+        ]
+        if near:
+            texts.append(
+                f"{len(near)} of {len(self.ends)} starts end within {100 * SAME_OBJECTIVE:g} % of the best objective at "
+                "other parameters: the recordings hardly tell these apart, or the fits stopped early. See profile."
+            )
+        return tuple(texts)
+
 
 def multistart(problem: Problem, starts: int | None = None, execution: Execution = Execution()) -> MultiStart:
     """Fit a problem from its guess and from other starts within a factor sqrt(10).

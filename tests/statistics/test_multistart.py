@@ -21,6 +21,7 @@ def test_starts_of_an_easy_problem_agree() -> None:
     """All reach the truth, and count as one optimum."""
     found = multistart(right_problem(), 4, HERE)
     assert found.clusters == ((0, 1, 2, 3),)
+    assert found.warnings == ()
     assert found.estimate.solver.starts == 4
     for item in found.estimate.parameters:
         assert abs(item.value - TRUTH[item.name]) < 4.0 * item.std_error
@@ -52,6 +53,23 @@ def test_ends_are_told_apart_and_a_failure_stops_nobody(monkeypatch: pytest.Monk
     assert {None, 0, 1} <= set(expected)
     assert {end.error for end in found.ends if end.cluster is None} == {"RuntimeError: no luck"}
     assert found.estimate.converged
+    failed = expected.count(None)
+    assert found.warnings == (f"{failed} of 9 starts failed, the first with: RuntimeError: no luck.",)
+
+
+def test_ends_as_good_as_the_best_elsewhere_are_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A valley along which the objective hardly changes is not passed over."""
+
+    def along(workshop: Workshop, start: list[float]) -> Any:
+        document = FIT_START(workshop, workshop.model.space.guess.tolist())
+        document["objective"] *= 1.0001
+        document["point"]["theta"][2] *= 1.5 if start[1] > workshop.model.space.guess[1] else 1.0
+        return document
+
+    monkeypatch.setattr(module, "fit_start", along)
+    found = multistart(right_problem(), 3, HERE)
+    assert len(found.clusters) == 2
+    assert "1 of 3 starts end within 0.1 % of the best objective at other parameters" in found.warnings[0]
 
 
 def test_no_end_at_all_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
