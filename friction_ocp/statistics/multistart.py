@@ -65,8 +65,8 @@ class MultiStart:
         ]
         if near:
             texts.append(
-                f"{len(near)} of {len(self.ends)} starts end within {100 * SAME_OBJECTIVE:g} % of the best objective at "
-                "other parameters: the recordings hardly tell these apart, or the fits stopped early. See profile."
+                f"{len(near)} of {len(self.ends)} starts end within {100 * SAME_OBJECTIVE:g} % of the best objective "
+                "at other parameters: the recordings hardly tell these apart, or the fits stopped early. See profile."
             )
         return tuple(texts)
 
