@@ -1,0 +1,128 @@
+"""Score `friction-ocp diagnose` on blind cases.
+
+python problems/blind/score.py --seed N [--cases M] [--out DIR] [--no-baselines]
+
+Makes the cases of a seed, diagnoses each through the command line, opens the answers, and prints the table; DIR gets
+score.json and confusion.png. What is on disk is not done again: a score that was stopped goes on at the case where it
+stood, and --cases can grow.
+
+Seeds. 1 to 999 are for development: their cases may be looked into, and what was changed for them makes them worthless
+as evidence. A report takes the date on which the code was frozen as its seed, YYYYMMDD, and is run once; any other seed
+is refused.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from blind.cases import Case, read_answer
+from blind.draw import make
+from blind.folder import write_json
+from blind.judging import Judged, Named, judge, named
+from blind.outside import OUTSIDE
+from blind.picture import draw_confusion
+from blind.running import TIME_LIMIT, Failed, confirmed, diagnosed, fitted_base, reached
+from blind.summary import Checked, Line, confusion, summary
+
+DEVELOPMENT = range(1, 1000)
+NOTHING = Named("failed", (), (), (), {}, None, TIME_LIMIT, None)
+"""A diagnosis without a result: wrong, whatever was asked."""
+
+
+def purpose(seed: int) -> str:
+    """Return what a seed is for; raises ValueError for one that is for nothing."""
+    if seed in DEVELOPMENT:
+        return "development"
+    try:
+        date.fromisoformat(str(seed))
+    except ValueError:
+        raise ValueError(f"--seed: {seed}; 1 to 999 for development, a date YYYYMMDD for a report") from None
+    return "report"
+
+
+def score_case(case: Case, folder: Path, baselines: bool) -> tuple[Judged, Checked]:
+    """Diagnose a case and check what its answer promises; raises Failed."""
+    problem = folder / "cases" / case.name / "problem.yaml"
+    result, seconds = diagnosed(problem, folder / "diagnoses" / case.name)
+    judged = judge(read_answer(folder, case.name), named(result, seconds))
+    memory = folder / "checks" / f"{case.name}.json"
+    known = json.loads(memory.read_text(encoding="utf-8")) if memory.exists() else {}
+    if "reached" not in known:
+        known |= _checked(case, result, problem, folder)
+    if baselines and judged.kind in ("none", "one") and "baselines" not in known:
+        from blind.baselines import baselines_right
+
+        base = fitted_base(problem, folder / "diagnoses" / case.name, folder / "bases" / case.name)
+        known["baselines"] = baselines_right(base, problem, read_answer(folder, case.name))
+    write_json(memory, known)
+    return judged, Checked(known["reached"], tuple(known["confirmed"]), known.get("baselines"))
+
+
+def _checked(case: Case, result: dict[str, Any], problem: Path, folder: Path) -> dict[str, Any]:
+    """Return the shrinkage on fresh recordings and the confirmation of every rival in an alias set."""
+    diagnosis, said = folder / "diagnoses" / case.name, named(result, 0.0)
+    gained = None
+    if said.accepted:
+        base = fitted_base(problem, diagnosis, folder / "bases" / case.name)
+        gained = reached(case, result, base, diagnosis / "augmented.yaml", folder / "fresh" / case.name)
+    marks: list[bool] = []
+    for members in said.alias_sets:
+        leader = next((item for item in said.accepted if item in members), sorted(members)[0])
+        for rival in sorted(members - {leader}):
+            marks.append(confirmed(case, problem, said.accepted, rival, leader, folder / "quiet" / case.name))
+    return {"reached": gained, "confirmed": marks}
+
+
+def main() -> int:
+    """Print a line a case and the table; exit 1 where a line of the table fails."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--cases", type=int, default=168)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--no-baselines", action="store_true")
+    options = parser.parse_args()
+    try:
+        what = purpose(options.seed)
+    except ValueError as error:
+        parser.error(str(error))
+    folder: Path = options.out or Path("results") / f"blind-{options.seed}"
+    judged: list[Judged] = []
+    checked: dict[str, Checked] = {}
+    failed = 0
+    for index in range(options.cases):
+        case = make(options.seed, index, folder)
+        try:
+            row, checked[case.name] = score_case(case, folder, not options.no_baselines)
+        except Failed as error:
+            failed += 1
+            print(f"{case.name}  failed: {error}", flush=True)
+            row = judge(read_answer(folder, case.name), NOTHING)
+        judged.append(row)
+        print(f"{case.name}  {'right' if row.right else 'WRONG':<6} {row.seconds:5.0f} s", flush=True)
+    lines = summary(judged, checked, failed)
+    report(judged, lines, folder, f"seed {options.seed} ({what}), {len(judged)} cases")
+    return int(any(line.passed is False for line in lines))
+
+
+def report(judged: list[Judged], lines: list[Line], folder: Path, title: str) -> None:
+    """Print the table, and leave it with every judged case and the picture in the folder."""
+    print(f"\n{title}")
+    for line in lines:
+        word = {True: "ok", False: "NO", None: ""}[line.passed]
+        print(f"{word:<3} {line.what}: {line.measured}")
+    write_json(folder / "score.json", {"title": title, "lines": [asdict(x) for x in lines],
+                                       "cases": [asdict(x) for x in judged]})  # fmt: skip
+    if judged:
+        draw_confusion(*confusion(judged), set(OUTSIDE), folder / "confusion.png")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
