@@ -1,4 +1,4 @@
-"""A diagnosis on disk: result.json, result.h5, augmented.yaml, report.html, figures."""
+"""A diagnosis on disk: result.json, result.h5, base.yaml and augmented.yaml, report.html, figures."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
     before, after = (_series(diagnosis, errors) for errors in (diagnosis.before, diagnosis.after))
     write_text(target / "result.json", json.dumps(document, indent=1, allow_nan=False))
     write_result_series(target / "result.h5", after)
-    path, final = diagnosis.problem.path, diagnosis.final
+    path = diagnosis.problem.path
     if path is not None:
-        text = write_problem(path, final.model.problem.drive, final.values, target, final.model.max_step)
-        write_text(target / "augmented.yaml", text)
+        for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
+            text = write_problem(path, fitted.model.problem.drive, fitted.values, target, fitted.model.max_step)
+            write_text(target / name, text)
     pictures: dict[str, Path] = {}
     taken: set[str] = set()
     (target / "figures").mkdir(exist_ok=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +10,24 @@ import numpy as np
 import yaml
 
 import friction_ocp as fo
-from blind import correlation
+from blind import correlation, every_model
 from blind.folder import write_text
 from blind.judging import Pair
 
-CORRELATION = "correlation of errors with features"
+CORRELATION, EVERY_MODEL = "correlation of errors with features", "lowest left-out error of every model"
+CHOICES = {"none": (), "correlation": (CORRELATION,), "all": (CORRELATION, EVERY_MODEL)}
 
 
-def baselines_right(base: Path, problem: Path, answer: Mapping[str, Any]) -> dict[str, bool]:
-    """Return whether each baseline names the effect of a case, or none where there is none."""
+def baselines_right(names: Sequence[str], base: Path, problem: Path, answer: Mapping[str, Any]) -> dict[str, bool]:
+    """Return whether each of the named baselines finds the effect of a case, or none where there is none."""
     fitted = fo.load_problem(_beside(base, problem))
-    said = {CORRELATION: correlation.answer(fitted, np.random.default_rng(answer["index"]))}
-    return {name: is_right(answer, pair) for name, pair in said.items()}
+
+    def said(name: str) -> Pair | None:
+        if name == EVERY_MODEL:
+            return every_model.answer(fitted)
+        return correlation.answer(fitted, np.random.default_rng(answer["index"]))
+
+    return {name: is_right(answer, said(name)) for name in names}
 
 
 def is_right(answer: Mapping[str, Any], said: Pair | None) -> bool:

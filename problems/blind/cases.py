@@ -86,7 +86,8 @@ class Case:
         """Return the answers that no measurement could tell from a hidden effect, itself first.
 
         Shafts that are joined rigidly move as one; a constant torque on the motor and an offset of a current that is an
-        input stand in one term of the equation of motion, as do torque constant and gain of such a current.
+        input stand in one term of the equation of motion, as do torque constant and gain of such a current. A number of
+        the motor may be called one of the motor or of its shaft.
         """
         machine, found = self.make_machine(), [(item.effect, item.component)]
         shafts = [shaft.name for shaft in machine.plant().shafts]
@@ -94,9 +95,10 @@ class Case:
             found += [(item.effect, name) for name in rigid_group(machine, item.component) if name != item.component]
         channels = machine.document["channels"].items()
         inputs = [name for name, channel in channels if channel["measures"].endswith("current") and "role" in channel]
-        same = {"constant_torque": "sensor_offset", "parameter_error": "sensor_gain"}.get(item.effect)
-        if same and shafts[0] in [place for _, place in found]:
-            found += [(same, channel) for channel in inputs]
+        if item.effect == "constant_torque" and shafts[0] in [place for _, place in found]:
+            found += [("sensor_offset", channel) for channel in inputs]
+        if item.effect == "parameter_error" and item.component == machine.document["drive"]["motor"]["name"]:
+            found += [("parameter_error", shafts[0]), *(("sensor_gain", channel) for channel in inputs)]
         return found
 
 

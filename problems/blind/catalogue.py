@@ -274,7 +274,7 @@ def inertia_error(site: Site, rng: Rng) -> Hidden:
 def parameter_error(site: Site, rng: Rng) -> Hidden:
     """Let another stated number of the part be wrong."""
     factor = float(np.exp(0.8 * site.size * _sign(rng)))
-    if site.component == site.plant.shafts[0].name:
+    if site.component == site.plant.motors[0].name:
         return site.with_motor(torque_constant=site.plant.motors[0].torque_constant * factor)
     if "-" in site.component:
         return site.with_joint(stiffness=site.joint.stiffness * factor)
@@ -349,7 +349,7 @@ def _balanced(machine: Machine) -> Iterator[str]:
 
 def _stated(machine: Machine) -> Iterator[str]:
     """Yield the parts with a stated number that `parameter_error` falsifies."""
-    yield from _first(machine)
+    yield machine.document["drive"]["motor"]["name"]
     yield from _joints(machine, rigid=False)
     yield from (item["name"] for item in machine.document["drive"]["shafts"] if "gravity" in item)
 

@@ -1,6 +1,6 @@
 """Score `friction-ocp diagnose` on blind cases.
 
-python problems/blind/score.py --seed N [--cases M] [--out DIR] [--no-baselines]
+python problems/blind/score.py --seed N [--cases M] [--out DIR] [--baselines all|correlation|none]
 
 Makes the cases of a seed, diagnoses each through the command line, opens the answers, and prints the table; DIR gets
 score.json and confusion.png. What is on disk is not done again: a score that was stopped goes on at the case where it
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
@@ -23,6 +24,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from blind.baselines import CHOICES, baselines_right
 from blind.cases import Case, read_answer
 from blind.draw import make
 from blind.folder import write_json
@@ -48,7 +50,7 @@ def purpose(seed: int) -> str:
     return "report"
 
 
-def score_case(case: Case, folder: Path, baselines: bool) -> tuple[Judged, Checked]:
+def score_case(case: Case, folder: Path, baselines: Sequence[str]) -> tuple[Judged, Checked]:
     """Diagnose a case and check what its answer promises; raises Failed."""
     problem = folder / "cases" / case.name / "problem.yaml"
     result, seconds = diagnosed(problem, folder / "diagnoses" / case.name)
@@ -57,13 +59,12 @@ def score_case(case: Case, folder: Path, baselines: bool) -> tuple[Judged, Check
     known = json.loads(memory.read_text(encoding="utf-8")) if memory.exists() else {}
     if "reached" not in known:
         known |= _checked(case, result, problem, folder)
-    if baselines and judged.kind in ("none", "one") and "baselines" not in known:
-        from blind.baselines import baselines_right
-
+    missing = [name for name in baselines if name not in known["baselines"]]
+    if missing and judged.kind in ("none", "one"):
         base = fitted_base(problem, folder / "diagnoses" / case.name, folder / "bases" / case.name)
-        known["baselines"] = baselines_right(base, problem, read_answer(folder, case.name))
+        known["baselines"] |= baselines_right(missing, base, problem, read_answer(folder, case.name))
     write_json(memory, known)
-    return judged, Checked(known["reached"], tuple(known["confirmed"]), known.get("baselines"))
+    return judged, Checked(known["reached"], tuple(known["confirmed"]), known["baselines"])
 
 
 def _checked(case: Case, result: dict[str, Any], problem: Path, folder: Path) -> dict[str, Any]:
@@ -78,7 +79,7 @@ def _checked(case: Case, result: dict[str, Any], problem: Path, folder: Path) ->
         leader = next((item for item in said.accepted if item in members), sorted(members)[0])
         for rival in sorted(members - {leader}):
             marks.append(confirmed(case, problem, said.accepted, rival, leader, folder / "quiet" / case.name))
-    return {"reached": gained, "confirmed": marks}
+    return {"reached": gained, "confirmed": marks, "baselines": {}}
 
 
 def main() -> int:
@@ -87,7 +88,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--cases", type=int, default=168)
     parser.add_argument("--out", type=Path)
-    parser.add_argument("--no-baselines", action="store_true")
+    parser.add_argument("--baselines", choices=list(CHOICES), default="all")
     options = parser.parse_args()
     try:
         what = purpose(options.seed)
@@ -100,7 +101,7 @@ def main() -> int:
     for index in range(options.cases):
         case = make(options.seed, index, folder)
         try:
-            row, checked[case.name] = score_case(case, folder, not options.no_baselines)
+            row, checked[case.name] = score_case(case, folder, CHOICES[options.baselines])
         except Failed as error:
             failed += 1
             print(f"{case.name}  failed: {error}", flush=True)

@@ -147,6 +147,11 @@ def test_what_cannot_be_told_apart_is_an_equivalent_answer() -> None:
         ("sensor_offset", "current"),
     ]
     assert case.equivalents(Planted("unbalance", "gear", 0.1, 0, 5.0)) == [("unbalance", "gear")]
+    assert case.equivalents(Planted("parameter_error", "drive", 0.1, 0, 5.0)) == [
+        ("parameter_error", "drive"),
+        ("parameter_error", "motor"),
+        ("sensor_gain", "current"),
+    ]
     assert case.equivalents(Planted("stribeck", "axis", 0.1, 0, 5.0)) == [("stribeck", "axis")]
 
 

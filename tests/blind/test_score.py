@@ -8,11 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from blind import correlation
 from blind.arithmetic import calibration, excess, expected_error, log_score, mcnemar, share_interval, shrinkage
+from blind.cases import Case, Planted
+from blind.document import truth
+from blind.folder import write_problem
 from blind.judging import Judged, judge, named
 from blind.picture import draw_confusion
+from blind.recording import run
+from blind.running import Failed, diagnosed, reached
 from blind.score import NOTHING, purpose
 from blind.summary import Checked, Line, confusion, summary
+
+from friction_ocp import load_problem
 
 
 def item(effect: str, component: str = "motor") -> dict[str, str]:
@@ -203,6 +211,42 @@ def test_the_confusion_matrix_counts_what_was_said_first(tmp_path: Path) -> None
     assert counts[rows.index("no effect"), columns.index("no_gap")] == 10 and counts.sum() == 20
     draw_confusion(rows, columns, counts, {"wind"}, tmp_path / "confusion.png")
     assert (tmp_path / "confusion.png").stat().st_size > 5000
+
+
+def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
+    """A diagnosis that ends without a result carries the words of the command."""
+    with pytest.raises(Failed, match=r"exit status 1.*missing\.yaml"):
+        diagnosed(tmp_path / "missing.yaml", tmp_path / "out")
+
+
+def test_shrinkage_is_measured_on_fresh_recordings(tmp_path: Path) -> None:
+    """The true model closes the gap of one that lacks unbalance; the model that lacks it closes nothing."""
+    case = Case(5, 1, "one", "servo", (Planted("unbalance", "motor", 0.3, 7, 20.0),))
+    machine = case.make_machine()
+    document = truth(machine.document)
+    torque, phase = case.hidden().plant.shafts[0].gravity
+    problems = {}
+    for name in ("base", "augmented"):
+        problems[name] = write_problem(tmp_path / name, machine, document, {}, {})
+        problems[name] = problems[name].rename(problems[name].with_name(f"{name}.yaml"))
+        document["drive"]["shafts"][0]["gravity"] = {"torque": torque, "phase": phase}
+    result = {"gap": {"horizon_s": None}}
+    gained = reached(case, result, problems["base"], problems["augmented"], tmp_path / "fresh")
+    floor_of_a_free_run = 0.02
+    assert gained == pytest.approx(1.0, abs=floor_of_a_free_run)
+    assert reached(case, result, problems["base"], problems["base"], tmp_path / "fresh") == 0.0
+
+
+@pytest.mark.parametrize("effect", [None, "polyline_break"])
+def test_correlation_finds_what_is_plain(effect: str | None, tmp_path: Path) -> None:
+    """The first baseline names a strong break of the slope of a joint under its loop, and nothing where nothing is hidden."""
+    planted = () if effect is None else (Planted(effect, "motor", 0.5, 7, 20.0),)
+    case = Case(5, 4, "one", "robot", planted)
+    machine = replace(case.make_machine(), samples=3000)
+    recorded = {kind: run(machine, case.hidden(), kind, (5, k))[0] for k, kind in enumerate(("steps", "moves"))}
+    path = write_problem(tmp_path, machine, truth(machine.document), recorded, {})
+    found = correlation.answer(load_problem(path), np.random.default_rng(0))
+    assert (found and found[0]) == effect
 
 
 def test_seeds_have_a_purpose() -> None:

@@ -10,6 +10,7 @@ import pytest
 from diagnosis_cases import axis, write_case
 
 from friction_ocp.cli import main
+from friction_ocp.estimation.estimate import simulate
 from friction_ocp.problem_file.load import load_problem
 
 RISE, STRIBECK_SPEED = 0.05, 6.0
@@ -58,6 +59,14 @@ def test_the_augmented_problem_is_a_problem(stribeck: tuple[Path, dict[str, Any]
     simulated = json.loads((folder / "simulated" / "result.json").read_text(encoding="utf-8"))
     ratio = simulated["fit"]["validation"]["position"]["noise_ratio"]
     assert ratio == pytest.approx(result["gap"]["after"]["position"]["noise_ratio"], rel=0.05)
+
+
+def test_the_base_problem_is_the_fit_without(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """base.yaml simulates as the diagnosis found the model before."""
+    folder, result = stribeck
+    simulation = simulate(load_problem(folder / "base.yaml"))
+    ratio = simulation.validation_errors["position"][0].noise_ratio
+    assert ratio == pytest.approx(result["gap"]["before"]["position"]["noise_ratio"], rel=0.05)
 
 
 def test_files_for_people(stribeck: tuple[Path, dict[str, Any]]) -> None:
