@@ -60,10 +60,16 @@ def fitted_base(problem: Path, diagnosis: Path, folder: Path) -> Path:
 
 
 def reached(case: Case, result: Mapping[str, Any], base: Path, augmented: Path, folder: Path) -> float | None:
-    """Return the share of the excess that is gone on recordings of the same machine that nobody has seen."""
+    """Return the share of the excess that is gone on recordings of the same machine that nobody has seen.
+
+    Raises Failed where a model that the diagnosis left cannot be simulated.
+    """
     fresh = write_fresh(case, folder)
     horizon = result["gap"]["horizon_s"]
-    ratios = [_noise_ratios(model, fresh, horizon, folder / f"{model.stem}.yaml") for model in (base, augmented)]
+    try:
+        ratios = [_noise_ratios(model, fresh, horizon, folder / f"{model.stem}.yaml") for model in (base, augmented)]
+    except fo.FrictionOcpError as error:
+        raise Failed(f"its model cannot be simulated: {error}") from None
     return shrinkage(*ratios)
 
 

@@ -239,7 +239,7 @@ def test_shrinkage_is_measured_on_fresh_recordings(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("effect", [None, "polyline_break"])
 def test_correlation_finds_what_is_plain(effect: str | None, tmp_path: Path) -> None:
-    """The first baseline names a strong break of the slope of a joint under its loop, and nothing where nothing is hidden."""
+    """The first baseline names a strong break of slope in a closed loop, and nothing where nothing is hidden."""
     planted = () if effect is None else (Planted(effect, "motor", 0.5, 7, 20.0),)
     case = Case(5, 4, "one", "robot", planted)
     machine = replace(case.make_machine(), samples=3000)
