@@ -27,10 +27,11 @@ def clues_of(fitted: FittedModel) -> Clues:
 
 def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
     """Return (x, u, p) -> motions of all shafts and torques of all motors, and their names."""
-    sizes = (len(mech.angle_groups), len(mech.free_groups), len(mech.bristles), len(mech.extra_names))
-    x = [ca.SX.sym(f"x{k}", size) for k, size in enumerate((*sizes, len(mech.memory_names)))]
-    q, v = group_angles(mech, x[0]), group_speeds(mech, x[1])
-    at = Motion(q, v, x[3], x[4])
+    groups = (mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names, mech.lagging, mech.looping)
+    parts = [ca.SX.sym(f"x{k}", len(group)) for k, group in enumerate((*groups, mech.memory_names))]
+    angles, speeds, _, extra, lagged, loops, memory = parts
+    q, v = group_angles(mech, angles), group_speeds(mech, speeds)
+    at = Motion(q, v, extra, memory, lagged, loops)
     shafts, motors = mech.drive.shafts, mech.drive.motors
     values = [mech.shaft_angle(shaft.name, at) for shaft in shafts]
     values += [mech.shaft_speed(shaft.name, v) for shaft in shafts]
@@ -38,7 +39,7 @@ def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
     names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
     names += [f"{motor.name}.torque" for motor in motors]
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
-    return ca.Function("watch", [ca.vertcat(*x), u, p], [column(values)]), names
+    return ca.Function("watch", [ca.vertcat(*parts), u, p], [column(values)]), names
 
 
 def states_along(fitted: FittedModel, index: int) -> FloatArray:

@@ -23,6 +23,8 @@ from friction_ocp.estimation.problem import Problem
 
 SIGNIFICANCE = 0.01
 MOST_ROUNDS = 4
+PLAUSIBLE = 0.05
+"""Level of the score test where there is a gap for certain."""
 REFITTED = 6
 """Candidates that are refitted in a round."""
 WORTH_REFITTING = 0.1
@@ -147,17 +149,22 @@ def _round(current: FittedModel, names: list[str], level: float, rng: np.random.
         seen = screen(current.model, current.linear, blocks, effect, place, clues)
         found += [] if seen is None else [seen]
     found.sort(key=lambda item: -item.gain)
-    shortlist = _shortlist(found, level)
+    power = excess(rows, blocks)
+    shortlist = _shortlist(found, level, power.significant(level))
     rivals = _rivals(current, shortlist, blocks, tell)
     choice = choose(rivals, blocks, level, rng)
-    power = excess(rows, blocks)
     accepted = choice.rivals[0] if choice.significant and _is_material(current, choice.rivals[0].fitted) else None
     return Round(tuple(found), choice, current, power, accepted)
 
 
-def _shortlist(found: Sequence[Screened], level: float) -> list[Screened]:
-    """Return candidates that are significant after correction for their number (Bonferroni), and worth a refit."""
-    significant = [item for item in found if item.p_value * len(found) < level and item.gain > 0]
+def _shortlist(found: Sequence[Screened], level: float, gap: bool) -> list[Screened]:
+    """Return candidates that are worth a refit.
+
+    Where there is a gap for certain, a mere sign of significance is enough: the decision is made on recordings left
+    out. Otherwise a candidate must be significant after correction for the number of candidates (Bonferroni).
+    """
+    limit = PLAUSIBLE if gap else level / max(len(found), 1)
+    significant = [item for item in found if item.p_value < limit and item.gain > 0]
     if not significant:
         return []
     return [item for item in significant if item.gain >= WORTH_REFITTING * significant[0].gain][:REFITTED]

@@ -22,7 +22,10 @@ from friction_ocp.simulation.grid import FloatArray
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
+FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
+MOST_FOLDS = 4
+"""Groups of recordings that free runs are fitted without, one after another."""
 SHRINK = 0.01
 """Share of the information of a left-out recording that is kept: where nothing else informs, a step stays small."""
 
@@ -47,16 +50,17 @@ class FittedModel:
 
     @property
     def objective(self) -> float:
-        """Half the sum of squares."""
-        return 0.5 * float(np.sum(self.linear.rows.residual**2))
+        """The cost of all residuals: half their sum of squares, or what the loss makes of them."""
+        return self.linear.program.objective(self.linear.point)
 
 
 def fit_base(model: Model) -> FittedModel:
     """Fit the base model from its guesses and lay the footing on which all models are compared."""
     rough = footing(model, model.space.guess)
     if rough.segment_s is None:
-        theta = fit(model).solution.point.theta
-        return polished(model, footing(model, theta), theta, None)
+        fitted = fit(model)
+        theta = fitted.solution.point.theta
+        return polished(model, footing(model, theta, fitted.program.loss), theta, None)
     program, end = _rough_answer(model)
     foot = footing(model, end.theta)
     exact = foot.program(model, program.experiments)
@@ -102,10 +106,13 @@ def refit(base: FittedModel, drive: Drive, values: Mapping[str, float]) -> Fitte
 
 
 def held_out(fitted: FittedModel) -> FloatArray:
-    """Return (rows,) costs of every recording under parameters that it took no part in.
+    """Return (rows,) costs of every recording under parameters that it took no part in; its states are its own.
 
-    The parameters without a recording are one Gauss-Newton step from those with all of them; its states are its own.
+    Where short segments make the program nearly linear, the parameters without a recording are one Gauss-Newton step
+    from those with all of them; free runs are fitted again without it.
     """
+    if fitted.footing.segment_s is None:
+        return _held_out_free_runs(fitted)
     rows, count = fitted.linear.rows, len(fitted.linear.recordings)
     prior = rows.jacobian[rows.recording < 0]
     hessians = [item.jacobian.T @ item.jacobian for item in fitted.linear.recordings]
@@ -121,6 +128,27 @@ def held_out(fitted: FittedModel) -> FloatArray:
     return np.concatenate([*costs, np.zeros(rows.residual.size - sum(cost.size for cost in costs))])
 
 
+def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
+    program, point = fitted.linear.program, fitted.linear.point
+    count = len(program.experiments)
+    groups = np.array_split(np.arange(count), min(count, MOST_FOLDS))
+    costs: dict[int, FloatArray] = {}
+    for group in groups:
+        others = [k for k in range(count) if k not in group]
+        rest = replace(
+            program,
+            experiments=tuple(program.experiments[k] for k in others),
+            segments=tuple(program.segments[k] for k in others),
+        )
+        start = Point(point.theta, tuple(point.nodes[k] for k in others))
+        theta = solve_gauss_newton(rest, start, FOLD).point.theta if others else point.theta
+        for k in group.tolist():
+            alone = _only(program, k)
+            costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (point.nodes[k],)), STEPS_FROM_HELD_OUT))
+    found = [costs[k] for k in range(count)]
+    return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
+
+
 def _only(program: Program, index: int) -> Program:
     return replace(program, experiments=(program.experiments[index],), segments=(program.segments[index],))
 
@@ -130,13 +158,13 @@ def raw_costs(program: Program, point: Point) -> FloatArray:
     result = program.simulate(0, point)
     item, cut, nodes = program.experiments[0], program.segments[0], point.nodes[0]
     errors = np.where(np.isfinite(item.measured), program.residuals(0, result.y), 0.0)
-    parts = [errors.ravel()]
+    parts: list[FloatArray] = []
     if cut.gap_weight is not None and cut.count > 1:
         parts.append(np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:]).ravel())
     if cut.start_weight is not None:
         suggested, _ = program.measured_states(item, point.theta, cut.first[cut.tied])
         parts.append((cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel())
-    return 0.5 * np.concatenate(parts) ** 2
+    return np.concatenate([program.loss.cost(errors).ravel(), *(0.5 * part**2 for part in parts)])
 
 
 def _solve(hessian: FloatArray, gradient: FloatArray) -> FloatArray:

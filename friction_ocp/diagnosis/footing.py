@@ -15,7 +15,7 @@ from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel, Motor
 from friction_ocp.estimation.experiment import Experiment, with_inputs
 from friction_ocp.estimation.horizon import is_held
-from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.model import Model, standstill_slope, typical_inputs
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program, Segments
@@ -53,12 +53,14 @@ class Footing:
     """Training recordings, or pieces of the only one, with the inputs of the base model."""
     inputs: tuple[str, ...]
     """Names of the inputs of the base model."""
+    loss: AbstractLoss = Squares()
+    """Of measurement errors: the one that the problem asks for where free runs are compared."""
 
     def program(self, model: Model, experiments: tuple[Experiment, ...]) -> Program:
         """Return the likelihood of some recordings under a model, as a least-squares program."""
         segments = tuple(self._segments(model, item) for item in experiments)
         width = 0.0 * model.speed_scale
-        return Program(model.space, model.drive, model.sweep, experiments, segments, self.noise, width, Squares())
+        return Program(model.space, model.drive, model.sweep, experiments, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
         """Return the likelihood of the training recordings; the grids are those of the model."""
@@ -105,8 +107,8 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     return found
 
 
-def footing(model: Model, theta: FloatArray) -> Footing:
-    """Return the common footing of all models, from the base model at `theta`."""
+def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:
+    """Return the common footing of all models, from the base model at `theta`; `loss` is that of free runs."""
     first = model.train[0]
     train = model.train if len(model.train) > 1 else tuple(pieces(first, FOLDS))
     numbers = {
@@ -115,7 +117,7 @@ def footing(model: Model, theta: FloatArray) -> Footing:
     }
     density = torque_noise(model, numbers[first.name])
     if is_held(model.problem.drive) and not any(density.values()):
-        return Footing(density, numbers, None, model.noise, train, model.drive.input_names)
+        return Footing(density, numbers, None, model.noise, train, model.drive.input_names, loss)
     bare = Footing(density, numbers, None, model.noise, train, model.drive.input_names)
     seconds = _segment_length(model, bare, first)
     inflated = np.sqrt(model.noise**2 + _within(model, bare, first, seconds))

@@ -15,7 +15,7 @@ class Rows:
     """Residuals of all recordings at a point, every other row free of what node states and parameters can absorb."""
 
     residual: FloatArray
-    """(rows,) at the solved nodes, in units of their standard deviations."""
+    """(rows,) at the solved nodes, in units of their standard deviations, times the root of the loss's weight."""
     jacobian: FloatArray
     """(rows, parameters) along the manifold of solved nodes."""
     recording: IntArray
@@ -53,18 +53,19 @@ class LinearRecording:
         result = program.simulate(index, point, derivatives=True)
         assert result.dy is not None and result.dend is not None
         self.y, self.end = result.y, result.end
-        self.noise = program.noise
+        self.noise, self.loss = program.noise, program.loss
         self.seen = np.isfinite(self.item.measured)
         time = np.arange(self.item.grid.time.size)
         self.segment = np.clip(np.searchsorted(self.cut.first, time, side="right") - 1, 0, self.cut.count - 1)
-        self.dy = result.dy[:, :, : self.states] / self.noise[:, None]
+        errors = np.where(self.seen, (self.y - self.item.measured) / self.noise, 0.0)
+        self.scaling = np.sqrt(self.loss.weight(errors)) / self.noise
+        self.dy = result.dy[:, :, : self.states] * self.scaling[:, :, None]
         self.dend = result.dend[:, :, : self.states]
         _, self.slope = program.space.numbers_and_slope(point.theta, self.item.name)
         self._factor()
-        errors = np.where(self.seen, (self.y - self.item.measured) / self.noise, 0.0)
         gaps, starts = self._gaps(self.end[:-1] - self.nodes[1:]), self._start_errors(program, point)
-        self.raw = self._stack(errors, gaps, starts)
-        by_theta = result.dy[:, :, self.states :] @ self.slope / self.noise[:, None]
+        self.raw = self._stack(errors * self.scaling * self.noise, gaps, starts)
+        by_theta = result.dy[:, :, self.states :] @ self.slope * self.scaling[:, :, None]
         end_theta = result.dend[:-1, :, self.states :] @ self.slope
         columns = self._stack_columns(by_theta, end_theta, self._start_slopes(program, point))
         self.direct = columns + self._measured_slopes(program, point)
@@ -117,7 +118,7 @@ class LinearRecording:
 
     def change(self, by_y: FloatArray, by_end: FloatArray) -> FloatArray:
         """Return (rows, k) what changes of outputs (n, outputs, k) and segment ends (segments, s, k) do in the end."""
-        return self.reduced(self._stack_columns(by_y / self.noise[:, None], by_end[:-1]))
+        return self.reduced(self._stack_columns(by_y * self.scaling[:, :, None], by_end[:-1]))
 
     def moved_by(self, step: FloatArray) -> FloatArray:
         """Return (segments, states) how the nodes follow a change of the parameters."""

@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.parts import Drive, Hysteresis, KinematicError, Transmission
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_transmission, transmission
-from friction_ocp.parameters import Free
+from friction_ocp.effects.periodic import wave
+from friction_ocp.parameters import Free, is_off
 
 
 class BacklashEffect(AbstractEffect):
@@ -60,3 +61,63 @@ class ComplianceEffect(AbstractEffect):
             for spring, loss in zip(springs, damping, strict=True)
         )
         return Augmentation(added, {path: np.inf}, trials)
+
+
+def _twist(drive: Drive, item: Transmission, clues: Clues) -> tuple[float, float]:
+    """Return typical torque, N m, and twist, rad, of an elastic transmission on its output side."""
+    torque = clues.typical_torque[item.to_shaft]
+    return torque, torque / max(clues.numbers[f"{item.name}.stiffness"], 1e-300)
+
+
+class StiffeningEffect(AbstractEffect):
+    """Stiffness grows with the twist."""
+
+    name: ClassVar[str] = "stiffening"
+    sentence: ClassVar[str] = "stiffness grows with the twist"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.transmissions if not item.rigid and is_off(item.stiffening)]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        torque, twist = _twist(drive, transmission(drive, place), clues)
+        size, path = 0.1 * torque / twist**3, f"{place}.stiffening"
+        added = change_transmission(drive, place, stiffening=Free(size, 0.0, 1e4 * size))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+
+
+class TransmissionHysteresisEffect(AbstractEffect):
+    """The twist has a loop."""
+
+    name: ClassVar[str] = "transmission_hysteresis"
+    sentence: ClassVar[str] = "the twist has a loop: friction inside the transmission"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.transmissions if not item.rigid and item.hysteresis is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        torque, twist = _twist(drive, transmission(drive, place), clues)
+        path, size = f"{place}.hysteresis", 0.05 * torque
+        twists = [0.05 * twist, 0.3 * twist, 2.0 * twist]
+        loop = Hysteresis(Free(size, 0.0, 1e3 * size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
+        added = change_transmission(drive, place, hysteresis=loop)
+        trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.twist": one}) for one in twists)
+        return Augmentation(added, {f"{path}.torque": 0.0}, trials)
+
+
+class KinematicErrorEffect(AbstractEffect):
+    """The ratio ripples with the angle."""
+
+    name: ClassVar[str] = "kinematic_error"
+    sentence: ClassVar[str] = "the ratio ripples with the angle of the input shaft"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [item.name for item in drive.transmissions if not item.rigid and item.kinematic_error is None]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        item = transmission(drive, place)
+        _, twist = _twist(drive, item, clues)
+        found = [*clues.periods(item.from_shaft, "theta")[:2], *clues.periods(item.to_shaft, "theta")[:2]]
+        ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
+        periods = [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
+        part, off, trials = wave(KinematicError, f"{place}.kinematic_error", 0.1 * twist, periods)
+        return Augmentation(change_transmission(drive, place, kinematic_error=part), off, trials)

@@ -15,7 +15,14 @@ from friction_ocp.effects.friction_curve import (
 )
 from friction_ocp.effects.friction_state import LoadDependenceEffect, PreslidingEffect
 from friction_ocp.effects.friction_time import WarmUpEffect
-from friction_ocp.effects.joints import BacklashEffect, ComplianceEffect
+from friction_ocp.effects.joints import (
+    BacklashEffect,
+    ComplianceEffect,
+    KinematicErrorEffect,
+    StiffeningEffect,
+    TransmissionHysteresisEffect,
+)
+from friction_ocp.effects.motor import DriveLagEffect, TorqueSaturationEffect
 from friction_ocp.effects.periodic import (
     CoggingEffect,
     PeriodicDisturbanceEffect,
@@ -38,8 +45,13 @@ BUILT_IN: tuple[type[AbstractEffect], ...] = (
     WarmUpEffect,
     CoggingEffect,
     TorqueRippleEffect,
+    DriveLagEffect,
+    TorqueSaturationEffect,
     BacklashEffect,
     ComplianceEffect,
+    StiffeningEffect,
+    TransmissionHysteresisEffect,
+    KinematicErrorEffect,
     UnbalanceEffect,
     ConstantTorqueEffect,
     PeriodicDisturbanceEffect,

@@ -14,6 +14,11 @@ from friction_ocp.parameters import Free
 _ANALOG = ("theta", "omega", "alpha", "current", "current_command", "torque", "voltage")
 
 
+def _analog(drive: Drive) -> list[Channel]:
+    """Return the channels that measure a part of the drive; a reference is what it is."""
+    return [item for item in drive.channels if item.signal in _ANALOG and item.part != "reference"]
+
+
 def _known(value: object) -> bool:
     return isinstance(value, (int, float))
 
@@ -38,7 +43,7 @@ class SensorOffsetEffect(AbstractEffect):
     sentence: ClassVar[str] = "the channel has an offset"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.channels if item.signal in _ANALOG and item.offset == 0.0]
+        return [item.name for item in _analog(drive) if item.offset == 0.0]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         size, path = 0.02 * _size(channel(drive, place), clues), f"{place}.offset"
@@ -53,7 +58,7 @@ class SensorGainEffect(AbstractEffect):
     sentence: ClassVar[str] = "the channel has a wrong scale"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.channels if item.signal in _ANALOG and _known(item.gain)]
+        return [item.name for item in _analog(drive) if _known(item.gain)]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         gain, path = float(channel(drive, place).gain), f"{place}.gain"

@@ -1,0 +1,53 @@
+"""Effects in how a motor makes its torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import ClassVar
+
+import numpy as np
+
+from friction_ocp.drive.parts import Drive, Motor
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_motor, motor_of
+from friction_ocp.parameters import Free, is_off
+
+
+def _motors(drive: Drive) -> list[Motor]:
+    return [motor for motor in drive.motors if any(shaft.name == motor.shaft for shaft in drive.shafts)]
+
+
+class DriveLagEffect(AbstractEffect):
+    """The torque follows the command late."""
+
+    name: ClassVar[str] = "drive_lag"
+    sentence: ClassVar[str] = "the torque follows the command late"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [motor.shaft for motor in _motors(drive) if is_off(motor.lag)]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        motor = motor_of(drive, place)
+        assert motor is not None
+        step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{motor.name}.lag"
+        times = [step, 5.0 * step, 25.0 * step]
+        added = change_motor(drive, motor.name, lag=Free(times[0], 1e-3 * step, 1e3 * step))
+        return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in times))
+
+
+class TorqueSaturationEffect(AbstractEffect):
+    """Torque per ampere falls with current."""
+
+    name: ClassVar[str] = "torque_saturation"
+    sentence: ClassVar[str] = "torque per ampere falls with current"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [motor.shaft for motor in _motors(drive) if is_off(motor.saturation)]
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        motor = motor_of(drive, place)
+        assert motor is not None
+        largest = max(float(np.max(np.abs(track.torque[motor.name]))) for track in clues.tracks)
+        current = max(largest, 1e-12) / max(abs(clues.numbers.get(f"{motor.name}.torque_constant", 1.0)), 1e-300)
+        size, path = 0.2 / current**2, f"{motor.name}.saturation"
+        added = change_motor(drive, motor.name, saturation=Free(size, 0.0, 1e3 * size))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
