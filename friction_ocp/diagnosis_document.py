@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
+from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
+from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.next_experiment import next_experiment
 from friction_ocp.diagnosis.select import Rival, probabilities
 from friction_ocp.drive.units import signal_unit, unit_of
@@ -64,9 +66,12 @@ def _units(diagnosis: Diagnosis) -> dict[str, str]:
 
 def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     cells = gap_map(diagnosis.base, diagnosis.before, diagnosis.after)
+    components = list(dict.fromkeys(component for _, component in diagnosis.accepted))
+    found = _shape(diagnosis, components) if diagnosis.gap else None
     return {
-        "components": list(dict.fromkeys(component for _, component in diagnosis.accepted)),
-        "depends_on": None,
+        "components": components or ([] if found is None else [found.component]),
+        "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
+        "shape": None if found is None else _curve(found),
         "map": [
             {
                 "component": cell.component,
@@ -79,6 +84,21 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
             for cell in cells
         ],
     }
+
+
+def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:
+    """Return the shape of what the base model lacks, on an accepted component that is a shaft, else where it shows."""
+    clues = clues_of(diagnosis.base)
+    shafts = [shaft.name for shaft in diagnosis.problem.drive.shafts]
+    wanted = [name for name in components if name in shafts] or ([] if components else shafts)
+    shapes = [found for found in (shape(clues, name) for name in wanted) if found is not None]
+    return max(shapes, key=lambda found: found.share, default=None)
+
+
+def _curve(found: Shape) -> dict[str, Any]:
+    columns = {"at": found.centre, "torque": found.torque, "lower": found.lower, "upper": found.upper}
+    numbers = {key: [_number(float(value)) for value in values] for key, values in columns.items()}
+    return {"component": found.component, "variable": found.variable, **numbers}
 
 
 def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
@@ -138,6 +158,7 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values
+    names &= set(final)
     return {name: {"value": final[name], "unit": units[name.partition("@")[0]]} for name in sorted(names)}
 
 

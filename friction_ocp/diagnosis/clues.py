@@ -7,18 +7,26 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
+from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.coordinates import group_angles, group_speeds
 from friction_ocp.drive.mechanism import Mechanism, Motion, column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.effects.effect import Clues, Track
+from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.estimation.stages import relaxed
 from friction_ocp.simulation.grid import FloatArray, IntArray
+
+SMOOTHING_STEPS = 4
 
 
 def clues_of(fitted: FittedModel) -> Clues:
     """Return what the fitted model says about motions and torques."""
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
-    tracks = tuple(_track(fitted, index, watch, names) for index in range(len(fitted.linear.recordings)))
+    smoothers = _smoothers(fitted)
+    tracks = tuple(_track(fitted, index, watch, names, smoothers[index]) for index in range(len(smoothers)))
     first = fitted.model.train[0].name
     numbers = fitted.model.space.numbers(fitted.theta, first)
     by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
@@ -49,7 +57,7 @@ def states_along(fitted: FittedModel, index: int) -> FloatArray:
     return result.states
 
 
-def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]) -> Track:
+def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str], smoother: LinearRecording) -> Track:
     item = fitted.linear.program.experiments[index]
     numbers = fitted.model.space.numbers(fitted.theta, item.name)
     states = states_along(fitted, index)
@@ -61,29 +69,39 @@ def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]
         return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in mech.drive.shafts}
 
     torque = {motor.name: table[f"{motor.name}.torque"] for motor in mech.drive.motors}
-    middle, missing = _missing(fitted, index)
+    middle, missing = _missing(fitted, smoother)
     return Track(item.grid.time, of("theta"), of("omega"), torque, middle, missing)
 
 
-def _missing(fitted: FittedModel, index: int) -> tuple[IntArray, dict[str, FloatArray]]:
+def _missing(fitted: FittedModel, smoother: LinearRecording) -> tuple[IntArray, dict[str, FloatArray]]:
     """Return the middle samples of segments and the mean torque that would close the gap behind each, by shaft."""
-    item, mech = fitted.linear.recordings[index], fitted.model.drive.mechanism
-    first = item.cut.first
+    mech, first = fitted.model.drive.mechanism, smoother.cut.first
     middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
-    numbers = fitted.footing.numbers[item.item.name]
-    inertias = group_inertias(mech, {**numbers, **fitted.values})
-    spans = np.diff(item.item.grid.time[first])[:-1]
+    name = smoother.item.name
+    inertias = group_inertias(mech, {**fitted.footing.numbers[name], **fitted.values})
+    spans = np.diff(smoother.item.grid.time[first])[:-1]
     missing: dict[str, FloatArray] = {}
     for shaft in mech.drive.shafts:
         group = mech.topology.group_of[shaft.name]
         torque = np.zeros(middle.size)
         if group in mech.free_groups and middle.size:
             at = len(mech.angle_groups) + mech.free_groups.index(group)
-            jump = item.nodes[1:, at] - item.end[:-1, at]
-            ratio = speed_ratio(fitted.model, fitted.footing, item.item.name, shaft.name)
+            jump = smoother.nodes[1:, at] - smoother.end[:-1, at]
+            ratio = speed_ratio(fitted.model, fitted.footing, name, shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
         missing[shaft.name] = torque
     return middle, missing
+
+
+def _smoothers(fitted: FittedModel) -> tuple[LinearRecording, ...]:
+    """Return recordings cut into segments between which the states may jump, to see what torque would make them."""
+    if fitted.footing.segment_s is not None:
+        return fitted.linear.recordings
+    items = fitted.linear.program.experiments
+    program = relaxed(fitted.model, items, 0.0, Squares())
+    start = Point(fitted.theta, program.suggested_nodes(fitted.theta))
+    point = solve_nodes(program, start, SMOOTHING_STEPS)
+    return tuple(LinearRecording(program, index, point) for index in range(len(items)))
 
 
 def _typical_torques(fitted: FittedModel, tracks: tuple[Track, ...], numbers: dict[str, float]) -> dict[str, float]:

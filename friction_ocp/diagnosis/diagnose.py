@@ -12,14 +12,16 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess, excess
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out, refit
+from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, held_out, quick_refit, without_addition
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened, screen
-from friction_ocp.diagnosis.select import Choice, Rival, choose
+from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples
+from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.simulation.grid import FloatArray
 
 SIGNIFICANCE = 0.01
 MOST_ROUNDS = 4
@@ -29,6 +31,8 @@ REFITTED = 6
 """Candidates that are refitted in a round."""
 WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
+FINISHED, CLOSE = 2, 1.5
+"""Candidates whose refit is completed: the best after a few steps, and all whose objective is within this factor."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 
@@ -72,7 +76,8 @@ class Diagnosis:
     @property
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
         """Sets of candidates that the recordings cannot tell apart."""
-        sets = [tuple(rival.key for rival in item.choice.aliases) for item in self.rounds if item.accepted is not None]
+        decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
+        sets = [tuple(rival.key for rival in item.choice.aliases) for item in decided]
         return tuple(keys for keys in sets if len(keys) > 1)
 
     @property
@@ -99,7 +104,8 @@ def diagnose(problem: Problem, tell: Tell = lambda what, share: None) -> Diagnos
         if done.accepted is None:
             break
         current = done.accepted.fitted
-        accepted.append(done.accepted.key)
+        tell("examining earlier additions again", 0.0)
+        current, accepted = _reexamined(base, current, [*accepted, done.accepted.key], level, rng)
     rows = current.linear.rows
     return Diagnosis(
         problem=problem,
@@ -113,6 +119,28 @@ def diagnose(problem: Problem, tell: Tell = lambda what, share: None) -> Diagnos
         remainder=excess(rows, blocks_of(rows)),
         seconds=time.perf_counter() - began,
     )
+
+
+def _reexamined(
+    base: FittedModel, current: FittedModel, accepted: list[Key], level: float, rng: np.random.Generator
+) -> tuple[FittedModel, list[Key]]:
+    """Drop earlier additions that the latest one has made superfluous on recordings left out."""
+    for key in accepted[:-1]:
+        kept = [other for other in accepted if other != key]
+        simpler = without_addition(current, _with_additions(base, kept))
+        blocks = blocks_of(current.linear.rows)
+        gains = blocks_like(current, simpler, blocks) - blocks.sums(held_out(current))
+        if np.quantile(resamples(blocks, rng) @ gains, level) <= 0:
+            current, accepted = simpler, kept
+    return current, accepted
+
+
+def _with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
+    """Return the drive of the base model with some effects, as they would be added in this order."""
+    drive, clues = base.model.problem.drive, clues_of(base)
+    for effect, place in keys:
+        drive = effects()[effect].augment(drive, place, clues).drive
+    return drive
 
 
 def _options(problem: Problem) -> tuple[float, list[str]]:
@@ -174,15 +202,20 @@ def _rivals(current: FittedModel, shortlist: Sequence[Screened], blocks: Blocks,
     if not shortlist:
         return []
     without = blocks.sums(held_out(current))
-    rivals: list[Rival] = []
+    tried: list[tuple[Screened, FittedModel]] = []
     for k, item in enumerate(shortlist):
         tell(f"refit with {item.effect} at {item.component}", 0.5 + 0.5 * k / len(shortlist))
-        fitted = refit(current, item.augmentation.drive, item.values)
-        rivals.append(Rival(item, fitted, without - blocks_like(current, fitted, blocks)))
+        tried.append((item, quick_refit(current, item.augmentation.drive, item.starts)))
+    tried.sort(key=lambda pair: pair[1].objective)
+    rivals: list[Rival] = []
+    for k, (item, quick) in enumerate(tried):
+        if k < FINISHED or quick.objective < CLOSE * tried[0][1].objective:
+            fitted = completed(quick)
+            rivals.append(Rival(item, fitted, without - blocks_like(current, fitted, blocks)))
     return rivals
 
 
-def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> np.ndarray:
+def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> FloatArray:
     """Return (blocks,) held-out costs of a refitted candidate over the blocks of the model without it."""
     rows, reference = fitted.linear.rows, current.linear.rows
     costs = held_out(fitted)

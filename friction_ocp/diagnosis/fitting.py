@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.contrast import contrast
+from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
-from friction_ocp.estimation.losses import Squares
+from friction_ocp.estimation.losses import Absolute, Squares
 from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
-from friction_ocp.estimation.stages import WIDTHS, predictions, relaxed
+from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
+QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=5)
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
+BLUNT = 0.2
+"""Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
 MOST_FOLDS = 4
@@ -60,7 +63,10 @@ def fit_base(model: Model) -> FittedModel:
     if rough.segment_s is None:
         fitted = fit(model)
         theta = fitted.solution.point.theta
-        return polished(model, footing(model, theta, fitted.program.loss), theta, None)
+        loss = fitted.program.loss
+        if isinstance(loss, Absolute):
+            loss = Absolute(BLUNT * mean_error(fitted.program, fitted.solution.point))
+        return polished(model, footing(model, theta, loss), theta, None)
     program, end = _rough_answer(model)
     foot = footing(model, end.theta)
     exact = foot.program(model, program.experiments)
@@ -78,21 +84,35 @@ def _rough_answer(model: Model) -> tuple[Program, Point]:
     return program, min(ends, key=lambda end: end.objective).point
 
 
-def polished(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:
+def polished(
+    model: Model,
+    foot: Footing,
+    theta: FloatArray,
+    nodes: tuple[FloatArray, ...] | None,
+    limits: Tolerances = WARM,
+) -> FittedModel:
     """Minimise the likelihood on the footing from a start."""
     program = foot.training(model)
     theta = model.space.clip(theta)
     point = Point(theta, program.suggested_nodes(theta) if nodes is None else nodes)
     if nodes is None:
         point = solve_nodes(program, point)
-    end = solve_gauss_newton(program, point, WARM).point if theta.size else solve_nodes(program, point)
+    end = solve_gauss_newton(program, point, limits).point if theta.size else solve_nodes(program, point)
     return FittedModel(model, foot, linear_program(program, end))
 
 
-def refit(base: FittedModel, drive: Drive, values: Mapping[str, float]) -> FittedModel:
-    """Fit a candidate drive from the base model's answer and the predicted values of what was added."""
-    model = with_drive(base.model, drive)
-    built = contrast(base.model, base.linear, drive)
+def quick_refit(base: FittedModel, drive: Drive, starts: Sequence[Mapping[str, float]]) -> FittedModel:
+    """Fit a candidate drive, a few steps from each start: the base model's answer and predicted values of the rest."""
+    model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
+    return min((_quick(base, model, built, values) for values in starts), key=lambda fitted: fitted.objective)
+
+
+def completed(fitted: FittedModel) -> FittedModel:
+    """Continue a refit to its end."""
+    return polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes)
+
+
+def _quick(base: FittedModel, model: Model, built: Contrast, values: Mapping[str, float]) -> FittedModel:
     wanted = built.theta(values)
     by_name = dict(zip(built.space.names, wanted, strict=True))
     theta = np.array([by_name[name] for name in model.space.names])
@@ -101,8 +121,16 @@ def refit(base: FittedModel, drive: Drive, values: Mapping[str, float]) -> Fitte
     at = np.array([known[name] for name in built.space.names])
     nodes = tuple(built.simulate(k, item, at)[2] for k, item in enumerate(base.linear.recordings))
     if not all(np.all(np.isfinite(item)) for item in nodes):
-        return polished(model, base.footing, theta, None)
-    return polished(model, base.footing, theta, nodes)
+        return polished(model, base.footing, theta, None, QUICK)
+    return polished(model, base.footing, theta, nodes, QUICK)
+
+
+def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
+    """Fit a drive that lacks something that the current model has."""
+    model = with_drive(current.model, drive)
+    known = current.values
+    theta = np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])
+    return polished(model, current.footing, theta, None)
 
 
 def held_out(fitted: FittedModel) -> FloatArray:

@@ -18,6 +18,9 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
+SECOND = 0.3
+"""Gain of a second start over that of the first from which it is worth trying."""
+
 
 @dataclass(frozen=True)
 class Screened:
@@ -29,9 +32,14 @@ class Screened:
     """Predicted decrease of the objective at its best trial."""
     p_value: float
     """Corrected for the number of trials."""
-    values: Mapping[str, float]
-    """Predicted values of the added parameters."""
+    starts: tuple[Mapping[str, float], ...]
+    """Predicted values of the added parameters, best first, from trials that are not neighbours."""
     augmentation: Augmentation
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Predicted values of the added parameters."""
+        return self.starts[0]
 
     @property
     def key(self) -> tuple[str, str]:
@@ -49,8 +57,11 @@ def screen(
     except FrictionOcpError:
         return None
     found = [_tried(built, blocks, augmentation, trial) for trial in augmentation.trials]
-    gain, p_value, values = max(found, key=lambda item: item[0])
-    return Screened(effect.name, place, gain, min(1.0, p_value * len(found)), values, augmentation)
+    best = max(range(len(found)), key=lambda k: found[k][0])
+    gain, p_value, values = found[best]
+    others = [k for k in range(len(found)) if abs(k - best) > 1 and found[k][0] > SECOND * gain]
+    second = [found[max(others, key=lambda k: found[k][0])][2]] if others else []
+    return Screened(effect.name, place, gain, min(1.0, p_value * len(found)), (values, *second), augmentation)
 
 
 def _tried(

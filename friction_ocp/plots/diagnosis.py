@@ -27,6 +27,9 @@ def diagnosis_figures(result: Json, before: Series, after: Series) -> Iterator[t
     cells = rows(part(result, "where"), "map")
     if cells:
         yield "gap-map", gap_map_figure(cells)
+    found = part(result, "where").get("shape")
+    if found:
+        yield "shape", shape_figure(found, part(result, "where"))
     for k, item in enumerate(rows(result, "rounds")):
         causes = rows(item, "causes")[:SHOWN]
         if causes:
@@ -52,6 +55,22 @@ def gap_map_figure(cells: Sequence[Json]) -> Figure:
     axes.set_title("Where the gap is")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     axes.invert_yaxis()
+    return figure
+
+
+def shape_figure(found: Json, where: Json) -> Figure:
+    """Draw the missing torque over the variable that explains most of it, with its band."""
+    figure = new_figure(3.6)
+    axes = axes_grid(figure, 1)[0][0]
+    at = np.asarray(found["at"], dtype=float)
+    axes.fill_between(at, found["lower"], found["upper"], color=GRID, label="95 % band of the mean")
+    axes.plot(at, found["torque"], color=MEASURED, marker="o", markersize=3.5, label="missing torque")
+    axes.axhline(0.0, color=MUTED, linewidth=1.0)
+    share = float(part(where, "depends_on")["share"])
+    axes.set_title(f"What the model lacks at {found['component']}: {found['variable']} explains {share:.0%} of it")
+    axes.set_xlabel(f"{found['variable']} (SI)")
+    axes.set_ylabel("torque or force (SI)")
+    axes.legend(loc="best")
     return figure
 
 

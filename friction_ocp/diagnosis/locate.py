@@ -1,0 +1,88 @@
+"""What the missing torque depends on: the variable that explains most of it, and its shape over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from friction_ocp.effects.effect import Clues
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+BINS = 16
+FOLDS = 5
+REACH = 1.96
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The missing torque of a shaft over the variable that explains most of it."""
+
+    component: str
+    variable: str
+    share: float
+    """Of its variance that the variable explains, cross-validated over stretches of time."""
+    centre: FloatArray
+    """(bins,) of the variable."""
+    torque: FloatArray
+    """(bins,) mean, N m."""
+    lower: FloatArray
+    upper: FloatArray
+    """(bins,) 95 % band of the mean."""
+
+
+def shape(clues: Clues, shaft: str) -> Shape | None:
+    """Return the shape of the missing torque of a shaft; None where it is not known."""
+    torque = np.concatenate([track.missing.get(shaft, np.zeros(0)) for track in clues.tracks])
+    if torque.size < 4 * BINS or not np.any(torque):
+        return None
+    variables = _variables(clues, shaft)
+    shares = {name: explained(values, torque) for name, values in variables.items()}
+    best = max(shares, key=lambda name: shares[name])
+    return _shape(shaft, best, shares[best], variables[best], torque)
+
+
+def _variables(clues: Clues, shaft: str) -> Mapping[str, FloatArray]:
+    def joined(series: list[FloatArray]) -> FloatArray:
+        parts = [values[track.middle] for values, track in zip(series, clues.tracks, strict=True)]
+        return np.concatenate(parts)
+
+    found = {
+        f"{shaft}.omega": joined([track.omega[shaft] for track in clues.tracks]),
+        f"{shaft}.theta": joined([track.theta[shaft] for track in clues.tracks]),
+        "time": joined([track.time - track.time[0] for track in clues.tracks]),
+    }
+    for motor in clues.tracks[0].torque:
+        found[f"{motor}.torque"] = joined([track.torque[motor] for track in clues.tracks])
+    return found
+
+
+def explained(values: FloatArray, torque: FloatArray) -> float:
+    """Return the share of the variance of the torque that its mean over bins of a variable predicts elsewhere."""
+    bins = _bins(values)
+    fold = (np.arange(torque.size) * FOLDS * 4 // torque.size) % FOLDS
+    left = 0.0
+    for k in range(FOLDS):
+        known, held = fold != k, fold == k
+        total = np.bincount(bins[known], torque[known], BINS)
+        count = np.bincount(bins[known], minlength=BINS)
+        mean = np.where(count > 0, total / np.maximum(count, 1), float(np.mean(torque[known])))
+        left += float(np.sum((torque[held] - mean[bins[held]]) ** 2))
+    whole = float(np.sum((torque - torque.mean()) ** 2))
+    return max(0.0, 1.0 - left / max(whole, 1e-300))
+
+
+def _bins(values: FloatArray) -> IntArray:
+    edges = np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
+    return np.searchsorted(edges, values).astype(np.int64)
+
+
+def _shape(shaft: str, name: str, share: float, values: FloatArray, torque: FloatArray) -> Shape:
+    bins = _bins(values)
+    count = np.maximum(np.bincount(bins, minlength=BINS), 1)
+    centre, mean = (np.bincount(bins, each, BINS) / count for each in (values, torque))
+    spread = np.sqrt(np.maximum(np.bincount(bins, torque**2, BINS) / count - mean**2, 0.0) / count)
+    told = np.bincount(bins, minlength=BINS) > 0
+    low, high = mean - REACH * spread, mean + REACH * spread
+    return Shape(shaft, name, share, centre[told], mean[told], low[told], high[told])
