@@ -12,7 +12,15 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess, excess
-from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, held_out, quick_refit, without_addition
+from friction_ocp.diagnosis.fitting import (
+    FittedModel,
+    completed,
+    farther,
+    fit_base,
+    held_out,
+    quick_refit,
+    without_addition,
+)
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples
@@ -32,7 +40,8 @@ REFITTED = 6
 WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
 FINISHED, CLOSE = 2, 1.5
-"""Candidates whose refit is completed: the best after a few steps, and all whose objective is within this factor."""
+"""Candidates whose refit is completed: the best after a few steps, and all whose objective is within this factor; of
+free runs, whose fits end late, all."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 
@@ -205,11 +214,14 @@ def _rivals(current: FittedModel, shortlist: Sequence[Screened], blocks: Blocks,
     tried: list[tuple[Screened, FittedModel]] = []
     for k, item in enumerate(shortlist):
         tell(f"refit with {item.effect} at {item.component}", 0.5 + 0.5 * k / len(shortlist))
-        tried.append((item, quick_refit(current, item.augmentation.drive, item.starts)))
+        starts = list(item.starts)
+        if current.footing.segment_s is None:
+            starts.append(farther(item.values, item.augmentation))
+        tried.append((item, quick_refit(current, item.augmentation.drive, starts)))
     tried.sort(key=lambda pair: pair[1].objective)
     rivals: list[Rival] = []
     for k, (item, quick) in enumerate(tried):
-        if k < FINISHED or quick.objective < CLOSE * tried[0][1].objective:
+        if k < FINISHED or current.footing.segment_s is None or quick.objective < CLOSE * tried[0][1].objective:
             fitted = completed(quick)
             rivals.append(Rival(item, fitted, without - blocks_like(current, fitted, blocks)))
     return rivals

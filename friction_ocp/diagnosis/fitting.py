@@ -11,6 +11,7 @@ from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import Augmentation
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.losses import Absolute, Squares
@@ -25,6 +26,7 @@ QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
 BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
+FARTHER = 5.0
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
 MOST_FOLDS = 4
@@ -105,6 +107,17 @@ def quick_refit(base: FittedModel, drive: Drive, starts: Sequence[Mapping[str, f
     """Fit a candidate drive, a few steps from each start: the base model's answer and predicted values of the rest."""
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
     return min((_quick(base, model, built, values) for values in starts), key=lambda fitted: fitted.objective)
+
+
+def farther(values: Mapping[str, float], augmentation: Augmentation) -> dict[str, float]:
+    """Return a start several times as far from off as predicted: under a large misfit predictions fall short."""
+    grown = {path for trial in augmentation.trials for amplitude in trial.amplitudes for path in amplitude}
+    inverse = any(trial.inverse for trial in augmentation.trials)
+    found = dict(values)
+    for path in grown & found.keys():
+        off = augmentation.off.get(path, 0.0)
+        found[path] = found[path] / FARTHER if inverse else off + FARTHER * (found[path] - off)
+    return found
 
 
 def completed(fitted: FittedModel) -> FittedModel:

@@ -13,6 +13,8 @@ from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 
 RESAMPLES = 2000
+ENOUGH_RECORDINGS = 6
+"""From which whole recordings are resampled."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,17 @@ class Choice:
 
 
 def resamples(blocks: Blocks, rng: np.random.Generator) -> FloatArray:
-    """Return (resamples, blocks) how often each block is drawn, block by block within its recording."""
+    """Return (resamples, blocks) how often each block is drawn.
+
+    Whole recordings are drawn where there are enough of them: held-out errors of one share the parameters that it had
+    no part in. Otherwise blocks are drawn within their recordings.
+    """
     counts = np.zeros((RESAMPLES, blocks.count))
-    for recording in np.unique(blocks.recording):
+    recordings, place = np.unique(blocks.recording, return_inverse=True)
+    if recordings.size >= ENOUGH_RECORDINGS:
+        drawn = rng.multinomial(recordings.size, np.full(recordings.size, 1.0 / recordings.size), RESAMPLES)
+        return drawn[:, place].astype(float)
+    for recording in recordings:
         own = np.flatnonzero(blocks.recording == recording)
         drawn = rng.integers(0, own.size, (RESAMPLES, own.size))
         for k in range(own.size):
