@@ -61,8 +61,8 @@ class Contrast:
         extra = np.setdiff1d(np.arange(len(names)), shared)
         if extra.size:
             first = int(item.cut.first[0])
-            started, _ = self.sweep.start(own.smooth[first], own.rate[first], own.grid.at_node[first], numbers)
-            nodes[0] = np.asarray(started).ravel()
+            at = (own.smooth[first], own.rate[first], own.grid.at_node[first])
+            nodes[0] = np.asarray(self.sweep.start.call([*at, numbers])[0]).ravel()
         nodes[:, shared] = item.nodes
         request = SweepRequest(own.grid, item.cut.first, nodes, numbers, width)
         result = empty_result(request, len(names), len(self.sweep.drive.output_names), 0)

@@ -175,7 +175,7 @@ def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
     groups = np.array_split(np.arange(count), min(count, MOST_FOLDS))
     costs: dict[int, FloatArray] = {}
     for group in groups:
-        others = [k for k in range(count) if k not in group]
+        others = [k for k in range(count) if not np.any(group == k)]
         rest = replace(
             program,
             experiments=tuple(program.experiments[k] for k in others),
@@ -183,7 +183,7 @@ def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
         )
         start = Point(point.theta, tuple(point.nodes[k] for k in others))
         theta = solve_gauss_newton(rest, start, FOLD).point.theta if others else point.theta
-        for k in group.tolist():
+        for k in [int(one) for one in group]:
             alone = _only(program, k)
             costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (point.nodes[k],)), STEPS_FROM_HELD_OUT))
     found = [costs[k] for k in range(count)]
