@@ -12,7 +12,7 @@ from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
-from friction_ocp.estimation.fit import fit
+from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
@@ -129,7 +129,7 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
         progress(report)
 
     try:
-        fitted = fit(model, remember)
+        model, fitted = settled(model, remember)
     except KeyboardInterrupt:
         stopped = _last_iterate(model, reports)
         raise Interrupted(conclude(model, stopped, built - began, time.perf_counter() - built)) from None

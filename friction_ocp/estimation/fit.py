@@ -10,6 +10,7 @@ from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.points_fit import fit_points
 from friction_ocp.estimation.progress import Phases, Progress, silent
+from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, joined, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
@@ -33,6 +34,12 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     models = [replace(model, space=model.space.moved(start)) for start in starts]
     best = min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)
     return detour(model, best, phases)
+
+
+def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
+    """Fit, then shorten the integrator's steps as far as the answer depends on them; return the model with them."""
+    fitted = fit(model, progress)
+    return refined(model, fitted, Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts))
 
 
 def _fit_once(model: Model, phases: Phases) -> Fitted:

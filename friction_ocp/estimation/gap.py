@@ -13,6 +13,8 @@ RELATIVE_GAP = 0.05
 """Standard deviation of a gap over the typical size of its state, where no process noise is stated."""
 DETERMINISTIC_GAP = 1e-4
 """The same for states that no noise enters: bristles, currents, the memory of a controller."""
+BRISTLE_GAP = 0.01
+"""The same for bristles."""
 
 
 def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
@@ -31,7 +33,8 @@ def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
     cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
     """
     mech = model.drive.mechanism
-    covariance = np.diag((DETERMINISTIC_GAP * model.state_scale) ** 2)
+    bristle = np.array([name.endswith(".friction.z") for name in model.drive.state_names])
+    covariance = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
     noise = _group_noise(model, item)
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):

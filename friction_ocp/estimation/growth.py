@@ -11,7 +11,7 @@ import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
-from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.release import released
 from friction_ocp.estimation.rounds import (
@@ -38,6 +38,8 @@ RELEASED_AT = 0.25
 FOLLOWED = 3
 """Distinct ends of the relaxed fit that are continued on free runs."""
 SAME = 1e-5
+HOPELESS = 10.0
+"""Objective over the best one beyond which an end is not continued."""
 
 
 def drifting(model: Model, plan: Plan, horizon_s: float, phases: Phases) -> Fitted:
@@ -100,11 +102,17 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
         before = fitted
         program = windowed(horizon_s * share)(model, 0.0, fitted.program.loss)
         watch = phases.begin(f"free run over {share:.0%} of the horizon")
-        start = program.point_along(fitted.program, fitted.solution.point)
+        start = _better_start(model, program, program.point_along(fitted.program, fitted.solution.point))
         solution = final_solver(model)(program, start, limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
     inside = not model.space.at_bounds(fitted.solution.point.theta).any()
     return Growth(fitted, inside and is_noise(fitted.program, fitted.solution) and _joined_at_no_cost(before, fitted))
+
+
+def _better_start(model: Model, program: Program, point: Point) -> Point:
+    """Return the point, or the guesses where these explain more: short predictions may end in nonsense."""
+    guess = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    return min(point, guess, key=program.objective)
 
 
 def _joined_at_no_cost(before: Fitted, after: Fitted) -> bool:
@@ -126,9 +134,10 @@ def _interval(model: Model) -> float:
 
 
 def _distinct(ends: Sequence[Fitted]) -> list[Fitted]:
-    """Drop ends that coincide with a better one: their objectives agree to SAME, relative."""
+    """Drop ends that coincide with a better one, their objectives agreeing to SAME, relative, and hopeless ones."""
     kept: list[Fitted] = []
     for end in ends:
-        if all(end.solution.objective > (1.0 + SAME) * other.solution.objective for other in kept):
+        hopeless = end.solution.objective > HOPELESS * ends[0].solution.objective
+        if not hopeless and all(end.solution.objective > (1.0 + SAME) * other.solution.objective for other in kept):
             kept.append(end)
     return kept

@@ -131,6 +131,14 @@ def with_drive(model: Model, drive: Drive) -> Model:
     )
 
 
+def with_step(model: Model, max_step: float) -> Model:
+    """Return a model with shorter integrator steps, s."""
+    train, validation = (
+        tuple(_with_step(item, max_step, model.max_step) for item in items) for items in (model.train, model.validation)
+    )
+    return replace(model, train=train, validation=validation, max_step=max_step)
+
+
 def seen_by(model: Model, drive: SteppedDrive, item: Experiment) -> Experiment:
     """Return a recording of a model, or a piece of one, with the inputs of another drive of the same channels."""
     recording = next(use.recording for use in model.problem.recordings if use.name == item.name)

@@ -111,7 +111,8 @@ class Program:
         value, by_active = many(*(signal[nodes].T for signal in signals), numbers)
         states, active = self.sweep.start.size1_out(0), len(self.space.active)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
-        return np.asarray(value).T, by_active @ slope
+        with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
+            return np.asarray(value).T, by_active @ slope
 
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""

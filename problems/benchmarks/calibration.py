@@ -46,7 +46,7 @@ SECONDS, RATE = 4.0, 1000.0
 TORQUE_CONSTANT, MOTOR_INERTIA, LOAD_INERTIA, RATIO = 0.35, 0.002, 4.0, 50.0
 STIFFNESS, DAMPING, LOAD_VISCOUS = 2.0e4, 20.0, 5.0
 ENCODER_NOISE = {"motor": 1.0e-2, "load": 2.0e-4}
-FINER = {"dahl": 0.2, "lugre": 0.2}
+FINER = {"dahl": 0.1, "lugre": 0.05}
 """Noise over ENCODER_NOISE where a bristle's deflection, 5e-3 rad, has to be seen."""
 
 TRUTH: dict[str, dict[str, Any]] = {
