@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from blind.catalogue import CATALOGUE, Site
+from blind.catalogue import CATALOGUE
 from blind.document import handbook, varied
 from blind.folder import write_json, write_problem, write_recordings
-from blind.machines import KINDS, MACHINES, Machine
+from blind.machines import MACHINES, Machine
+from blind.motions import KINDS
 from blind.outside import OUTSIDE
 from blind.recording import Hidden, run, silent
 from blind.scales import Scales, measure
+from blind.site import Site
 
 EFFECTS = CATALOGUE | OUTSIDE
 NUMBERS, SCALES, MOTIONS, LAST_MOTION, TRAIN, CHECK, FRESH, HANDBOOK = range(1, 9)
@@ -67,12 +69,14 @@ class Case:
         """Return what the sizes of effects refer to."""
         return measure(self.make_machine(), "steps", (self.seed, self.index, SCALES))
 
-    def hidden(self, *, without: bool = False) -> Hidden:
-        """Return the machine with all that is hidden in it, or without."""
+    def hidden(self) -> Hidden:
+        """Return the machine with all that is hidden in it."""
         machine = self.make_machine()
         hidden = Hidden(machine.plant())
-        scales = self.scales() if self.planted and not without else None
-        for item in self.planted if scales is not None else ():
+        if not self.planted:
+            return hidden
+        scales = self.scales()
+        for item in self.planted:
             site = Site(machine, scales, hidden, item.component, item.size)
             hidden = EFFECTS[item.effect].inject(site, np.random.default_rng(item.seed))
         return hidden

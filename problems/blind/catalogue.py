@@ -1,17 +1,14 @@
-"""The effects of the catalogue, hidden in a plant: where each can sit, and what it is at a size between 0 and 1.
+"""The effects of the catalogue, hidden in a plant: what each is at a size between 0 and 1, and where it can sit.
 
 The forms are those of the plant, drawn at random within what is physical; none is taken from the package.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from plant import (
-    Plant,
     PlantAmplifier,
     PlantFriction,
     PlantLoop,
@@ -22,75 +19,9 @@ from plant import (
     PlantWarmUp,
 )
 
-from blind.machines import Machine
-from blind.recording import Hidden, log_encoders
-from blind.scales import Scales
-
-Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Site:
-    """A place in a machine where something is to be hidden."""
-
-    machine: Machine
-    scales: Scales
-    hidden: Hidden
-    component: str
-    size: float
-    """0 is nothing, 1 is grave."""
-
-    @property
-    def plant(self) -> Plant:
-        """The plant so far."""
-        return self.hidden.plant
-
-    @property
-    def shaft(self) -> PlantShaft:
-        """The shaft of that name."""
-        return next(item for item in self.plant.shafts if item.name == self.component)
-
-    @property
-    def joint(self) -> PlantTransmission:
-        """The transmission of that name."""
-        return next(item for item in self.plant.transmissions if item.name == self.component)
-
-    def with_shaft(self, **changes: Any) -> Hidden:
-        """Return the plant with changes to the shaft."""
-        shafts = tuple(replace(s, **changes) if s.name == self.component else s for s in self.plant.shafts)
-        return replace(self.hidden, plant=replace(self.plant, shafts=shafts))
-
-    def with_friction(self, **changes: Any) -> Hidden:
-        """Return the plant with changes to the friction of the shaft."""
-        return self.with_shaft(friction=replace(self.shaft.friction, **changes))
-
-    def with_joint(self, **changes: Any) -> Hidden:
-        """Return the plant with changes to the transmission."""
-        joints = tuple(replace(t, **changes) if t.name == self.component else t for t in self.plant.transmissions)
-        return replace(self.hidden, plant=replace(self.plant, transmissions=joints))
-
-    def with_motor(self, **changes: Any) -> Hidden:
-        """Return the plant with changes to its motor."""
-        return replace(self.hidden, plant=replace(self.plant, motors=(replace(self.plant.motors[0], **changes),)))
-
-    def with_sensor(self, **changes: Any) -> Hidden:
-        """Return the plant with changes to the sensor of the channel and to the loop's view of the same instrument."""
-        measures = self.machine.document["channels"][self.component]["measures"]
-        return replace(self.hidden, plant=log_encoders(self.plant, measures, **changes))
-
-
-Inject = Callable[[Site, Rng], Hidden]
-
-
-def _sign(rng: Rng) -> float:
-    return float(rng.choice((-1.0, 1.0)))
-
-
-def harmonics(amplitude: float, period: float, rng: Rng) -> PlantRipple:
-    """Return a ripple whose fundamental has this amplitude, with two weak harmonics."""
-    size = amplitude * np.array([1.0, 0.2 * rng.uniform(), 0.1 * rng.uniform()])
-    phase = rng.uniform(0.0, 2 * np.pi, 3)
-    return PlantRipple(period, tuple(map(float, size * np.cos(phase))), tuple(map(float, size * np.sin(phase))))
+from blind import places
+from blind.recording import Hidden
+from blind.site import Effect, Rng, Site, harmonics, sign
 
 
 def stribeck(site: Site, rng: Rng) -> Hidden:
@@ -121,7 +52,7 @@ def quadratic_drag(site: Site, rng: Rng) -> Hidden:
 def asymmetry(site: Site, rng: Rng) -> Hidden:
     """Let Coulomb or viscous friction differ by direction."""
     name = str(rng.choice(["tau_c", "tau_c", "viscous"]))
-    value, share = getattr(site.shaft.friction, name), 0.9 * site.size * _sign(rng)
+    value, share = getattr(site.shaft.friction, name), 0.9 * site.size * sign(rng)
     return site.with_friction(**{name: (value * (1 + share), value * (1 - share))})
 
 
@@ -243,7 +174,7 @@ def unbalance(site: Site, rng: Rng) -> Hidden:
 
 def constant_torque(site: Site, rng: Rng) -> Hidden:
     """Let a constant torque act on the shaft."""
-    return site.with_shaft(external_torque=_sign(rng) * site.size * site.scales.torque(site.component))
+    return site.with_shaft(external_torque=sign(rng) * site.size * site.scales.torque(site.component))
 
 
 def periodic_disturbance(site: Site, rng: Rng) -> Hidden:
@@ -268,12 +199,12 @@ def structural_mode(site: Site, rng: Rng) -> Hidden:
 
 def inertia_error(site: Site, rng: Rng) -> Hidden:
     """Let the true inertia differ from the one that the file states."""
-    return site.with_shaft(inertia=site.shaft.inertia * float(np.exp(1.2 * site.size * _sign(rng))))
+    return site.with_shaft(inertia=site.shaft.inertia * float(np.exp(1.2 * site.size * sign(rng))))
 
 
 def parameter_error(site: Site, rng: Rng) -> Hidden:
     """Let another stated number of the part be wrong."""
-    factor = float(np.exp(0.8 * site.size * _sign(rng)))
+    factor = float(np.exp(0.8 * site.size * sign(rng)))
     if site.component == site.plant.motors[0].name:
         return site.with_motor(torque_constant=site.plant.motors[0].torque_constant * factor)
     if "-" in site.component:
@@ -284,12 +215,12 @@ def parameter_error(site: Site, rng: Rng) -> Hidden:
 
 def sensor_offset(site: Site, rng: Rng) -> Hidden:
     """Shift the zero of a sensor."""
-    return site.with_sensor(offset=_sign(rng) * site.size * _signal_scale(site))
+    return site.with_sensor(offset=sign(rng) * site.size * _signal_scale(site))
 
 
 def sensor_gain(site: Site, rng: Rng) -> Hidden:
     """Scale a sensor wrongly."""
-    return site.with_sensor(gain=1.0 + 0.3 * site.size * _sign(rng))
+    return site.with_sensor(gain=1.0 + 0.3 * site.size * sign(rng))
 
 
 def sensor_delay(site: Site, rng: Rng) -> Hidden:
@@ -315,97 +246,35 @@ def _signal_scale(site: Site) -> float:
     return float(np.sqrt(np.mean(site.scales.truth[f"{shaft}.{signal}"] ** 2)))
 
 
-def _shafts(machine: Machine) -> Iterator[str]:
-    yield from (item["name"] for item in machine.document["drive"]["shafts"])
-
-
-def _rubbing(machine: Machine) -> Iterator[str]:
-    """Yield the shafts whose friction the problem file knows."""
-    yield from (item["name"] for item in machine.document["drive"]["shafts"] if "friction" in item)
-
-
-def _first(machine: Machine) -> Iterator[str]:
-    yield machine.document["drive"]["shafts"][0]["name"]
-
-
-def _joints(machine: Machine, rigid: bool) -> Iterator[str]:
-    for part in machine.plant().transmissions:
-        if np.isinf(part.stiffness) == rigid:
-            yield part.name
-
-
-def _passing(machine: Machine) -> Iterator[str]:
-    """Yield the shafts with friction that drive another one."""
-    starts = {part.from_shaft for part in machine.plant().transmissions}
-    yield from (name for name in _rubbing(machine) if name in starts)
-
-
-def _balanced(machine: Machine) -> Iterator[str]:
-    """Yield the turning shafts on which the file knows no gravity."""
-    for item in machine.document["drive"]["shafts"]:
-        if "gravity" not in item and item.get("motion") != "linear":
-            yield item["name"]
-
-
-def _stated(machine: Machine) -> Iterator[str]:
-    """Yield the parts with a stated number that `parameter_error` falsifies."""
-    yield machine.document["drive"]["motor"]["name"]
-    yield from _joints(machine, rigid=False)
-    yield from (item["name"] for item in machine.document["drive"]["shafts"] if "gravity" in item)
-
-
-def _sensors(machine: Machine) -> Iterator[str]:
-    for name, item in machine.document["channels"].items():
-        if item.get("role") != "input" and not item["measures"].endswith("current"):
-            yield name
-
-
-def _wheels(machine: Machine) -> Iterator[str]:
-    """Yield the encoders of angle on the first shaft, which turns often enough to show an eccentricity."""
-    first = next(_first(machine))
-    for name, item in machine.document["channels"].items():
-        if item["measures"] == f"{first}.theta":
-            yield name
-
-
-@dataclass(frozen=True)
-class Effect:
-    """An effect with its places."""
-
-    name: str
-    inject: Inject
-    places: Callable[[Machine], Iterator[str]]
-
-
 CATALOGUE = {
     effect.name: effect
     for effect in (
-        Effect("stribeck", stribeck, _rubbing),
-        Effect("polyline_break", polyline_break, _rubbing),
-        Effect("quadratic_drag", quadratic_drag, _rubbing),
-        Effect("asymmetry", asymmetry, _rubbing),
-        Effect("position_ripple", position_ripple, _rubbing),
-        Effect("presliding", presliding, _rubbing),
-        Effect("load_dependence", load_dependence, _passing),
-        Effect("warm_up", warm_up, _rubbing),
-        Effect("cogging", cogging, _first),
-        Effect("torque_ripple", torque_ripple, _first),
-        Effect("drive_lag", drive_lag, _first),
-        Effect("torque_saturation", torque_saturation, _first),
-        Effect("backlash", backlash, lambda machine: _joints(machine, rigid=False)),
-        Effect("compliance", compliance, lambda machine: _joints(machine, rigid=True)),
-        Effect("stiffening", stiffening, lambda machine: _joints(machine, rigid=False)),
-        Effect("transmission_hysteresis", transmission_hysteresis, lambda machine: _joints(machine, rigid=False)),
-        Effect("kinematic_error", kinematic_error, lambda machine: _joints(machine, rigid=False)),
-        Effect("unbalance", unbalance, _balanced),
-        Effect("constant_torque", constant_torque, _shafts),
-        Effect("periodic_disturbance", periodic_disturbance, _shafts),
-        Effect("structural_mode", structural_mode, _shafts),
-        Effect("inertia_error", inertia_error, _shafts),
-        Effect("parameter_error", parameter_error, _stated),
-        Effect("sensor_offset", sensor_offset, _sensors),
-        Effect("sensor_gain", sensor_gain, _sensors),
-        Effect("sensor_delay", sensor_delay, _sensors),
-        Effect("sensor_eccentricity", sensor_eccentricity, _wheels),
+        Effect("stribeck", stribeck, places.rubbing),
+        Effect("polyline_break", polyline_break, places.rubbing),
+        Effect("quadratic_drag", quadratic_drag, places.rubbing),
+        Effect("asymmetry", asymmetry, places.rubbing),
+        Effect("position_ripple", position_ripple, places.rubbing),
+        Effect("presliding", presliding, places.rubbing),
+        Effect("load_dependence", load_dependence, places.passing),
+        Effect("warm_up", warm_up, places.rubbing),
+        Effect("cogging", cogging, places.first),
+        Effect("torque_ripple", torque_ripple, places.first),
+        Effect("drive_lag", drive_lag, places.first),
+        Effect("torque_saturation", torque_saturation, places.first),
+        Effect("backlash", backlash, lambda machine: places.joints(machine, rigid=False)),
+        Effect("compliance", compliance, lambda machine: places.joints(machine, rigid=True)),
+        Effect("stiffening", stiffening, lambda machine: places.joints(machine, rigid=False)),
+        Effect("transmission_hysteresis", transmission_hysteresis, lambda machine: places.joints(machine, rigid=False)),
+        Effect("kinematic_error", kinematic_error, lambda machine: places.joints(machine, rigid=False)),
+        Effect("unbalance", unbalance, places.balanced),
+        Effect("constant_torque", constant_torque, places.shafts),
+        Effect("periodic_disturbance", periodic_disturbance, places.shafts),
+        Effect("structural_mode", structural_mode, places.shafts),
+        Effect("inertia_error", inertia_error, places.shafts),
+        Effect("parameter_error", parameter_error, places.stated),
+        Effect("sensor_offset", sensor_offset, places.sensors),
+        Effect("sensor_gain", sensor_gain, places.sensors),
+        Effect("sensor_delay", sensor_delay, places.sensors),
+        Effect("sensor_eccentricity", sensor_eccentricity, places.wheels),
     )
 }

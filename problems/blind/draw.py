@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from blind.cases import EFFECTS, TRAIN, Case, Planted, case_of, read_answer, write_answer, write_case
-from blind.catalogue import CATALOGUE, Effect, Site
+from blind.catalogue import CATALOGUE
 from blind.machines import MACHINES
 from blind.outside import OUTSIDE
 from blind.recording import Hidden
+from blind.site import Effect, Site
 from blind.visibility import Excited, View, size_for
 
 BLOCK = ("none",) * 9 + ("one",) * 10 + ("two",) * 2 + ("outside",) * 3

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from plant import PlantAmplifier, PlantEndStop, PlantFrictionMemory, Trajectory
 
-from blind.catalogue import Effect, Rng, Site
-from blind.machines import Machine
+from blind import places
 from blind.recording import Extra, Hidden
+from blind.site import Effect, Rng, Site
 
 Inputs = Mapping[str, Trajectory]
 
@@ -100,33 +100,15 @@ def end_stop(site: Site, rng: Rng) -> Hidden:
     return site.with_shaft(end_stop=PlantEndStop(-1e9, at, stiffness))
 
 
-def _rubbing(machine: Machine) -> Iterator[str]:
-    yield from (item["name"] for item in machine.document["drive"]["shafts"] if "friction" in item)
-
-
-def _first(machine: Machine) -> Iterator[str]:
-    yield machine.document["drive"]["shafts"][0]["name"]
-
-
-def _last(machine: Machine) -> Iterator[str]:
-    yield machine.document["drive"]["shafts"][-1]["name"]
-
-
-def _amplified(machine: Machine) -> Iterator[str]:
-    """Yield the first shaft where the motor is driven by a current."""
-    if "resistance" not in machine.document["drive"]["motor"]:
-        yield from _first(machine)
-
-
 OUTSIDE = {
     effect.name: effect
     for effect in (
-        Effect("wind", wind, _last),
-        Effect("sticking", sticking, _rubbing),
-        Effect("dropouts", dropouts, _first),
-        Effect("magnetic_hysteresis", magnetic_hysteresis, _amplified),
-        Effect("rate_limit", rate_limit, _amplified),
-        Effect("friction_memory", friction_memory, _rubbing),
-        Effect("end_stop", end_stop, _last),
+        Effect("wind", wind, places.last),
+        Effect("sticking", sticking, places.rubbing),
+        Effect("dropouts", dropouts, places.first),
+        Effect("magnetic_hysteresis", magnetic_hysteresis, places.amplified),
+        Effect("rate_limit", rate_limit, places.amplified),
+        Effect("friction_memory", friction_memory, places.rubbing),
+        Effect("end_stop", end_stop, places.last),
     )
 }

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from plant import Plant, PlantSensor, Trajectory
 
-from blind.machines import LOOP_ENCODER, SUPPLY, Machine, reference
+from blind.machines import LOOP_ENCODER, SUPPLY, Machine
+from blind.motions import reference
 from friction_ocp.recording.recording import Channel, Recording
 
 Inputs = Mapping[str, Trajectory]

@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from blind.cases import Case, Planted, case_of, read_answer, write_fresh, write_quiet
-from blind.catalogue import CATALOGUE, Site
+from blind.catalogue import CATALOGUE
 from blind.document import truth, with_true
 from blind.draw import BLOCK, clash, cycled, draw, drawn_kind, make
 from blind.folder import write_problem
-from blind.machines import KINDS, MACHINES, Machine, plant_of
+from blind.machines import MACHINES, Machine, plant_of
+from blind.motions import KINDS
 from blind.outside import OUTSIDE
 from blind.recording import Hidden, run, silent
 from blind.scales import measure
+from blind.site import Site
 from blind.visibility import Excited, View, size_for
 
 import friction_ocp as fo
