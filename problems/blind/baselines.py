@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 import friction_ocp as fo
-from blind import correlation, every_model
+from blind import correlation
 from blind.folder import write_text
 from blind.judging import Pair
 
@@ -24,6 +24,8 @@ def baselines_right(names: Sequence[str], base: Path, problem: Path, answer: Map
 
     def said(name: str) -> Pair | None:
         if name == EVERY_MODEL:
+            from blind import every_model
+
             return every_model.answer(fitted)
         return correlation.answer(fitted, np.random.default_rng(answer["index"]))
 

@@ -13,8 +13,8 @@ from blind.judging import Pair
 from friction_ocp import FrictionOcpError, Problem
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out, refit
-from friction_ocp.diagnosis.screen import screen
+from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, held_out, quick_refit
+from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.estimation.model import prepare
 
@@ -27,17 +27,17 @@ def answer(problem: Problem) -> Pair | None:
     base = fit_base(prepare(problem))
     blocks, clues = blocks_of(base.linear.rows), clues_of(base)
     costs: dict[Pair | None, float] = {None: float(np.sum(held_out(base)))}
-    entries = candidates(problem.drive, list(effects()))
+    entries = candidates(problem.drive, problem.diagnosis.get("effects") or list(effects()))
     found = [screen(base.model, base.linear, blocks, effect, place, clues) for effect, place in entries]
     promising = sorted((item for item in found if item is not None), key=lambda item: -item.gain)[:FITTED]
     for item in promising:
-        costs[item.key] = _left_out(base, item.augmentation.drive, item.values)
+        costs[item.key] = _left_out(base, item)
     return min(costs, key=costs.__getitem__)
 
 
-def _left_out(base: FittedModel, drive: object, values: object) -> float:
+def _left_out(base: FittedModel, item: Screened) -> float:
     try:
-        cost = float(np.sum(held_out(refit(base, drive, values))))  # type: ignore[arg-type]
+        cost = float(np.sum(held_out(completed(quick_refit(base, item.augmentation.drive, item.starts)))))
     except (FrictionOcpError, np.linalg.LinAlgError):
         return np.inf
     return cost if np.isfinite(cost) else np.inf

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blind import correlation
+from blind import correlation, every_model
 from blind.arithmetic import calibration, excess, expected_error, log_score, mcnemar, share_interval, shrinkage
 from blind.cases import Case, Planted
-from blind.document import truth
+from blind.document import handbook, truth
 from blind.folder import write_problem
 from blind.judging import Judged, judge, named
 from blind.picture import draw_confusion
@@ -247,6 +247,17 @@ def test_correlation_finds_what_is_plain(effect: str | None, tmp_path: Path) -> 
     path = write_problem(tmp_path, machine, truth(machine.document), recorded, {})
     found = correlation.answer(load_problem(path), np.random.default_rng(0))
     assert (found and found[0]) == effect
+
+
+def test_the_lowest_left_out_error_finds_what_is_plain(tmp_path: Path) -> None:
+    """The second baseline names unbalance of a servo's motor among three effects."""
+    case = Case(5, 1, "one", "servo", (Planted("unbalance", "motor", 0.3, 7, 20.0),))
+    machine = replace(case.make_machine(), samples=800)
+    recorded = {kind: run(machine, case.hidden(), kind, (5, k))[0] for k, kind in enumerate(("steps", "moves"))}
+    document = handbook(machine.document, np.random.default_rng(0))
+    document["diagnosis"] = {"effects": ["unbalance", "quadratic_drag", "constant_torque"]}
+    path = write_problem(tmp_path, machine, document, recorded, {})
+    assert every_model.answer(load_problem(path)) == ("unbalance", "motor")
 
 
 def test_seeds_have_a_purpose() -> None:
