@@ -176,11 +176,11 @@ def responses(seed: int) -> list[Recording]:
         )
         made.append(closed_loop(f"moves_{direction}", "speed profile under the loop", seed, moves))
         for name, speed in (("slow", 1.11e-4), ("fast", 3.90e-2)):
-            level = corners((0.0, sign * speed), (20.0, sign * speed))
+            level = corners((0.0, 0.0), (0.1, sign * speed), (20.0, sign * speed))
             made.append(closed_loop(f"{name}_{direction}", f"{speed:g} rad/s under the loop", seed, level))
     turns = [(0.0, 0.0)] + [(2.0 + 4.0 * k, 600.0 * (-1.0) ** k) for k in range(5)]
     made.append(open_loop("hysteresis", "torque up and down below breakaway", seed, corners(*turns), FAST_LOG))
-    sidereal = corners((0.0, 15.0 * aries.ARCSEC), (60.0, 15.0 * aries.ARCSEC))
+    sidereal = corners((0.0, 0.0), (0.1, 15.0 * aries.ARCSEC), (60.0, 15.0 * aries.ARCSEC))
     made.append(closed_loop("sidereal", "15 arcsec/s under the loop", seed, sidereal))
     return made
 

@@ -1,0 +1,39 @@
+"""Coherence of two signals, and the distance of two curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from friction_ocp.estimation.agreement import coherence, curve_distance
+
+TIME = np.linspace(0.0, 20.0, 4001)
+
+
+def test_a_filtered_signal_is_coherent_where_it_has_power(rng_seed: int = 0) -> None:
+    """A linear copy has coherence 1, independent noise next to none, and both together their share of power."""
+    rng = np.random.default_rng(rng_seed)
+    first, noise = rng.standard_normal((2, TIME.size))
+    assert np.min(coherence(TIME, 2.0 * first, first).share[1:]) > 0.999
+    assert np.mean(coherence(TIME, noise, first).share) < 0.3
+    shared = coherence(TIME, first + noise, first).share
+    assert np.mean(shared) == pytest.approx(0.5, abs=0.1)
+
+
+def test_missing_samples_are_bridged() -> None:
+    """Gaps do not spread."""
+    wave = np.sin(2 * np.pi * 3.0 * TIME) * np.exp(-0.2 * TIME)
+    holes = np.where(np.arange(TIME.size) % 7 == 3, np.nan, wave)
+    found = coherence(TIME, holes, wave)
+    assert found.share[np.argmin(np.abs(found.frequency - 3.0))] > 0.99
+
+
+def test_the_distance_is_least_along_the_curve() -> None:
+    """Equal curves are no distance apart; a shift in time costs at most k times the shift, and a shift in value
+    leaves d next to nothing: it is a deviation, blind to bias."""
+    wave = np.sin(2 * np.pi * 0.5 * TIME)
+    assert curve_distance(TIME, wave, wave) == pytest.approx(0.0, abs=1e-6)
+    shifted = np.sin(2 * np.pi * 0.5 * (TIME - 0.02))
+    assert 0.0 < curve_distance(TIME, wave, shifted, scale=1.0) < 0.02
+    line = 0.1 * TIME
+    assert curve_distance(TIME, line, line + 0.3, scale=1.0) < 0.1 * 0.3
