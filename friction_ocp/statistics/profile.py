@@ -25,6 +25,8 @@ stats: Any = _stats  # its own types are incomplete
 
 BETTER = 0.1
 """Fall of the scaled likelihood ratio below the optimum that is worth a warning."""
+NARROW = 0.5
+"""Width of a likelihood interval over that of the standard error below which it is doubted."""
 WIDEST_FIRST_STEP = 0.1
 """Over the range between the bounds."""
 SIDES: tuple[Literal[-1, 1], ...] = (-1, 1)
@@ -142,6 +144,12 @@ def _side(outcome: Outcome) -> Mapping[str, Any]:
     return outcome.value
 
 
+def _is_narrow(item: Profile) -> bool:
+    low, high = item.interval
+    wald = item.parameter.interval95
+    return low is not None and high is not None and high - low < NARROW * (wald[1] - wald[0])
+
+
 def _verdict(interval: tuple[float | None, float | None]) -> Word:
     told = sum(end is not None for end in interval)
     return "finite" if told == 2 else "one_sided" if told else "flat"
@@ -156,6 +164,12 @@ def _warnings(items: Sequence[Profile], outcomes: Mapping[str, Outcome]) -> tupl
             f"The profile of {lowest.parameter.name} falls below the optimum at {at:.6g} {lowest.parameter.unit}: the "
             "fit ended in a local one, and the intervals are about that. Run multistart, or start from there."
         )
+    texts += [
+        f"{item.parameter.name}: its likelihood interval is less than half as wide as that of its standard error. The "
+        "objective is rough there, or fits with it held stopped early: trust the wider one."
+        for item in items
+        if _is_narrow(item)
+    ]
     for item in items:
         stopped = [end for end in item.ends if end in ("points", "solver")]
         if stopped:

@@ -19,6 +19,10 @@ STEPS_TO_THRESHOLD = 4
 """Grid points that a parabola would get between the optimum and the threshold."""
 MOST_POINTS = 30
 REFINEMENTS = 4
+RESTARTS = 3
+NEGLIGIBLE = 0.01
+"""Gain of the objective, over the rise that reaches the threshold twice, that is not worth another restart of a solver:
+one that stopped early would make a profile too narrow."""
 CLOSE = 0.02
 """Distance of the signed root from its threshold, relative, at which a crossing is found."""
 LARGEST_CHANGE, SMALLEST_CHANGE = 4.0, 0.25
@@ -176,4 +180,9 @@ class _Walk:
         lower[k] = upper[k] = value
         held = replace(self._program, space=replace(space, lower=lower, upper=upper))
         end = resolve(self._model, held, start)
+        for _ in range(RESTARTS):
+            again = resolve(self._model, held, end.point)
+            gained, end = end.objective - again.objective, min(end, again, key=lambda solution: solution.objective)
+            if not gained > NEGLIGIBLE * self._aim.threshold * self._aim.scale:
+                break
         return _Stop(value, 2.0 * (end.objective - self._lowest) / self._aim.scale, end.point, end.converged)
