@@ -69,7 +69,7 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     components = list(dict.fromkeys(component for _, component in diagnosis.accepted))
     found = _shape(diagnosis, components) if diagnosis.gap else None
     return {
-        "components": components or ([] if found is None else [found.component]),
+        "components": components or ([] if diagnosis.rest is None else [diagnosis.rest]),
         "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
         "shape": None if found is None else _curve(found),
         "map": [
@@ -90,7 +90,8 @@ def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:
     """Return the shape of what the base model lacks, on an accepted component that is a shaft, else where it shows."""
     clues = clues_of(diagnosis.base)
     shafts = [shaft.name for shaft in diagnosis.problem.drive.shafts]
-    wanted = [name for name in components if name in shafts] or ([] if components else shafts)
+    rest = [] if diagnosis.rest is None else [diagnosis.rest]
+    wanted = [name for name in components if name in shafts] or ([] if components else rest or shafts)
     shapes = [found for found in (shape(clues, name) for name in wanted) if found is not None]
     return max(shapes, key=lambda found: found.share, default=None)
 
@@ -102,7 +103,7 @@ def _curve(found: Shape) -> dict[str, Any]:
 
 
 def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
-    gap = item.accepted is not None or item.excess.significant(diagnosis.level)
+    gap = item.accepted is not None or item.excess.significant(diagnosis.level) or diagnosis.left_over
     available = max(item.before.objective - 0.5 * _samples(item), 1e-300)
     pairs = zip(item.choice.rivals, item.choice.probabilities, strict=True)
     causes = [_cause(item, rival, chance, available) for rival, chance in pairs]
@@ -163,10 +164,16 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
 
 
 def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
-    significant = diagnosis.remainder.significant(diagnosis.level)
-    last = diagnosis.rounds[-1]
-    component = last.screened[0].component if significant and last.screened else None
-    return {"significant": significant, "component": component, "ratio": diagnosis.remainder.ratio}
+    last, component = diagnosis.rounds[-1], diagnosis.rest
+    if component is None and diagnosis.left_over and last.screened:
+        component = last.screened[0].component
+    slow = [{"component": item.component, "ratio": item.ratio, "p_value": item.p_value} for item in diagnosis.slow]
+    return {
+        "significant": diagnosis.left_over,
+        "component": component,
+        "ratio": diagnosis.remainder.ratio,
+        "slow_torque": slow,
+    }
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from friction_ocp.diagnosis.fitting import (
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples
+from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -75,12 +76,30 @@ class Diagnosis:
     before: FreeErrors
     after: FreeErrors
     remainder: Excess
+    slow: tuple[SlowTorque, ...]
+    """Slow torques that the final model lacks, by shaft."""
     seconds: float
 
     @property
     def gap(self) -> bool:
         """Whether the base model lacks something."""
-        return bool(self.accepted) or self.rounds[0].excess.significant(self.level)
+        return bool(self.accepted) or self.left_over
+
+    @property
+    def left_over(self) -> bool:
+        """Whether more than noise is left.
+
+        Where nothing was added a slow torque of any shape tells; after an addition the power of the innovations alone,
+        because a law of slightly another shape leaves a slow torque too.
+        """
+        slow = any(item.p_value * len(self.slow) < self.level for item in self.slow)
+        return self.remainder.significant(self.level) or (slow and not self.accepted)
+
+    @property
+    def rest(self) -> str | None:
+        """The component where what is left sits: where a slow torque explains most of it."""
+        largest = max(self.slow, key=lambda item: item.ratio, default=None)
+        return largest.component if largest is not None and self.left_over else None
 
     @property
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
@@ -94,7 +113,7 @@ class Diagnosis:
         """explained, no_gap, unknown_effect or undecided."""
         if not self.gap:
             return "no_gap"
-        if self.remainder.significant(self.level):
+        if self.left_over:
             return "unknown_effect"
         return "undecided" if self.alias_sets else "explained"
 
@@ -126,6 +145,7 @@ def diagnose(problem: Problem, tell: Tell = lambda what, share: None) -> Diagnos
         before=free_errors(base, held_out=True),
         after=free_errors(current, held_out=True),
         remainder=excess(rows, blocks_of(rows)),
+        slow=slow_torques(current, clues_of(current)),
         seconds=time.perf_counter() - began,
     )
 

@@ -1,0 +1,46 @@
+"""A slow torque of no known shape is seen where there is one, and only there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
+
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
+from friction_ocp.estimation.model import prepare
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.recording import Channel, Recording
+
+GUSTS = 0.01
+"""Deviation of the unknown torque, N m, from half second to half second."""
+
+
+def found(path: Path) -> SlowTorque:
+    """Return the test on the only shaft of a case."""
+    fitted = fit_base(prepare(load_problem(path)))
+    (one,) = slow_torques(fitted, clues_of(fitted))
+    return one
+
+
+def test_noise_is_no_slow_torque(tmp_path: Path) -> None:
+    """A model that lacks nothing passes."""
+    assert found(write_case(tmp_path, axis())).p_value > 0.01
+
+
+def test_gusts_are_seen(tmp_path: Path) -> None:
+    """A torque that wanders, put into a recording as current that the model is not told of, is found."""
+    path = write_case(tmp_path, axis())
+    rng = np.random.default_rng(3)
+    for k, name in enumerate("ab"):
+        honest = record(axis(), name, 10 + k)
+        current = honest.channels["current"]
+        walk = np.interp(current.time, np.linspace(0, SECONDS, 9), rng.normal(0.0, GUSTS / TORQUE_CONSTANT, 9))
+        hidden = Channel("current", current.time, current.values - walk, current.unit)
+        write_recording(Recording(name, {**honest.channels, "current": hidden}), tmp_path / f"{name}.h5")
+    one = found(path)
+    assert one.p_value < 1e-6
+    assert one.ratio > 2.0
