@@ -21,7 +21,8 @@ OFF = 1.04
 
 def axis(**friction: Any) -> Plant:
     """Return one mass; friction beyond Coulomb and viscous is what a model lacks."""
-    law = PlantFriction(**({"law": "coulomb_viscous", "tau_c": COULOMB, "viscous": VISCOUS} | friction))
+    plain: dict[str, Any] = {"law": "coulomb_viscous", "tau_c": COULOMB, "viscous": VISCOUS}
+    law = PlantFriction(**(plain | friction))
     return Plant(
         shafts=(PlantShaft("motor", INERTIA, law),),
         motors=(PlantMotor("motor", "motor", torque_constant=TORQUE_CONSTANT),),
