@@ -8,9 +8,9 @@ import numpy as np
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
 from friction_ocp.diagnosis.linear import LinearRecording
-from friction_ocp.drive.coordinates import group_angles, group_speeds
-from friction_ocp.drive.mechanism import Mechanism, Motion, column
+from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
+from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Track
 from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.program import Point
@@ -35,19 +35,16 @@ def clues_of(fitted: FittedModel) -> Clues:
 
 def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
     """Return (x, u, p) -> motions of all shafts and torques of all motors, and their names."""
-    groups = (mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names, mech.lagging, mech.looping)
-    parts = [ca.SX.sym(f"x{k}", len(group)) for k, group in enumerate((*groups, mech.memory_names))]
-    angles, speeds, _, extra, lagged, loops, memory = parts
-    q, v = group_angles(mech, angles), group_speeds(mech, speeds)
-    at = Motion(q, v, extra, memory, lagged, loops)
+    state = state_symbols(mech)
+    at = state.motion(mech)
     shafts, motors = mech.drive.shafts, mech.drive.motors
     values = [mech.shaft_angle(shaft.name, at) for shaft in shafts]
-    values += [mech.shaft_speed(shaft.name, v) for shaft in shafts]
+    values += [mech.shaft_speed(shaft.name, at) for shaft in shafts]
     values += [motor_torque(mech, motor, at) for motor in motors]
     names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
     names += [f"{motor.name}.torque" for motor in motors]
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
-    return ca.Function("watch", [ca.vertcat(*parts), u, p], [column(values)]), names
+    return ca.Function("watch", [state.x, u, p], [column(values)]), names
 
 
 def states_along(fitted: FittedModel, index: int) -> FloatArray:

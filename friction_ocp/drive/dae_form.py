@@ -13,8 +13,9 @@ import casadi as ca
 
 from friction_ocp.dae import Dae, Variable
 from friction_ocp.drive.coordinates import group_angles, group_speeds
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import through_joint, transmitted_torque
-from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import extra_rates, lag_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
@@ -70,8 +71,8 @@ def dae(drive: Drive, width: float) -> Dae:
     torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
-    acceleration = column([_acceleration(mech, g, torques, friction) for g in range(len(mech.topology.roots))])
-    found = column([through_joint(mech, joint, acceleration, torques, friction) for joint in mech.loaded_joints()])
+    acceleration = column([_acceleration(mech, at, g, torques, friction) for g in range(len(mech.topology.roots))])
+    found = column([through_joint(mech, joint, at, acceleration, torques, friction) for joint in mech.loaded_joints()])
     turning = [at.v[g] for g in mech.angle_groups]
     speeding = [acceleration[g] for g in mech.free_groups]
     outputs = [recorded(mech, channel, at, acceleration) for channel in mech.drive.outputs]
@@ -116,7 +117,7 @@ def _friction(
     rates: list[Any] = []
     deflection = mech.deflections(symbols.bristle)
     for shaft in mech.drive.shafts:
-        omega, transmitted = mech.shaft_speed(shaft.name, at.v), transmitted_torque(mech, shaft, load)
+        omega, transmitted = mech.shaft_speed(shaft.name, at), transmitted_torque(mech, shaft, load)
         element = shaft.friction.under(mech.surroundings(shaft, at))
         if shaft.name in deflection:
             torque, rate = element.bristle_torque(omega, deflection[shaft.name], transmitted)
@@ -127,13 +128,13 @@ def _friction(
     return friction, rates
 
 
-def _acceleration(mech: Mechanism, group: int, torques: dict[str, Any], friction: dict[str, Any]) -> Any:
+def _acceleration(mech: Mechanism, at: Motion, group: int, torques: dict[str, Any], friction: dict[str, Any]) -> Any:
     """Return the acceleration of a group; 0 where its motion is an input."""
     if group in mech.prescribed:
         return 0.0
-    ratio = mech.topology.speed_ratio
-    moving = sum(ratio[name] * (torques[name] - friction[name]) for name in mech.topology.members(group))
-    return moving / mech.inertia(group)
+    members = mech.topology.members(group)
+    moving = sum(mech.speed_ratio(name, at) * (torques[name] - friction[name]) for name in members)
+    return (moving - mech.inertial_torque(group, at)) / mech.inertia(group, at)
 
 
 def _states(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:

@@ -83,7 +83,7 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     if not joints:
         return Kick(v, mean, load)
     acceleration = (v - step.v) / step.h
-    found = column([through_joint(mech, joint, acceleration, torques, friction) for joint in joints])
+    found = column([through_joint(mech, joint, step.at, acceleration, torques, friction) for joint in joints])
     return Kick(v, mean, load, Unknown(symbols, found))
 
 
@@ -92,15 +92,14 @@ def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:
     groups = len(mech.topology.roots)
     speed = ca.SX.sym("speed", groups)
     symbolic = applied_torques(mech, replace(step.at, v=speed), step.width[groups])
-    total = [_group_sum(mech, g, symbolic) for g in range(groups)]
+    total = [_group_sum(mech, step.at, g, symbolic) for g in range(groups)]
     own = [ca.substitute(ca.jacobian(ca.SX(total[g]), speed[g]), speed, step.at.v) for g in range(groups)]
     torques = {name: ca.substitute(ca.SX(torque), speed, step.at.v) for name, torque in symbolic.items()}
     return torques, own
 
 
-def _group_sum(mech: Mechanism, group: int, torques: dict[str, Any]) -> Any:
-    ratio = mech.topology.speed_ratio
-    return sum(ratio[name] * torques[name] for name in mech.topology.members(group))
+def _group_sum(mech: Mechanism, at: Motion, group: int, torques: dict[str, Any]) -> Any:
+    return sum(mech.speed_ratio(name, at) * torques[name] for name in mech.topology.members(group))
 
 
 def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> Any:
@@ -124,17 +123,18 @@ def _solve(
     for group in mech.free_groups:
         members = mech.topology.members(group)
         responses = {name: _response(mech, step, mech.drive.shaft(name), load) for name in members}
-        whole, before = _combined(mech, responses), step.v[group]
+        whole, before = _combined(mech, step.at, responses), step.v[group]
         damping = whole.slope - own[group]
-        pushed = _group_sum(mech, group, torques) - own[group] * step.at.v[group] - whole.offset
-        gain = step.h / mech.inertia(group)
+        pushed = _group_sum(mech, step.at, group, torques) - own[group] * step.at.v[group] - whole.offset
+        pushed = pushed - mech.inertial_torque(group, step.at)
+        gain = step.h / mech.inertia(group, step.at)
         free = before + gain * (pushed - 0.5 * damping * before)
         divisor = ca.fmax(ca.SX(1.0 + 0.5 * gain * damping), 0.5)
         moved = soft_threshold(free, gain * whole.upper, gain * whole.lower, step.width[group]) / divisor
         speeds[group], means[group] = moved, 0.5 * (before + moved)
         if not ca.SX(whole.upper + whole.lower).is_zero():
             at_rest = {name: _response(mech, step, mech.drive.shaft(name), load, 0.0) for name in members}
-            resting = _combined(mech, at_rest)
+            resting = _combined(mech, step.at, at_rest)
             slid = (free - gain * where(before >= 0, whole.upper, -whole.lower)) / divisor
             speeds[group], means[group] = _through_rest(step, group, gain * pushed, gain, resting, slid, moved)
         set_valued = (free - speeds[group] * divisor) / gain
@@ -167,16 +167,16 @@ def _response(
     element: FrictionElement = shaft.friction.under(mech.surroundings(shaft, step.at))
     transmitted = transmitted_torque(mech, shaft, load)
     response = element.step_response(step.h, omega, step.bristle.get(shaft.name, 0.0), transmitted)
-    now = mech.shaft_speed(shaft.name, step.at.v) if speed is None else ca.SX(speed)
+    now = mech.shaft_speed(shaft.name, step.at) if speed is None else ca.SX(speed)
     terms = (response.offset, response.slope, response.upper, response.lower)
     return StepResponse(*(ca.substitute(ca.SX(term), omega, now) for term in terms))
 
 
-def _combined(mech: Mechanism, responses: dict[str, StepResponse]) -> StepResponse:
+def _combined(mech: Mechanism, at: Motion, responses: dict[str, StepResponse]) -> StepResponse:
     """Refer the responses of all shafts of a group to its first shaft."""
     offset, slope, upper, lower = 0.0, 0.0, 0.0, 0.0
     for name, response in responses.items():
-        ratio = mech.topology.speed_ratio[name]
+        ratio = mech.speed_ratio(name, at)
         forward, backward = _levels(ratio, response)
         offset += ratio * response.offset
         slope += ratio**2 * response.slope
@@ -207,7 +207,7 @@ def _shared(
     only = sum(not ca.SX(item.upper + item.lower).is_zero() for item in responses.values()) <= 1
     friction: dict[str, Any] = {}
     for name, response in responses.items():
-        ratio = mech.topology.speed_ratio[name]
+        ratio = mech.speed_ratio(name, step.at)
         if only:
             share: Any = 0.0 if ca.SX(response.upper + response.lower).is_zero() else 1.0
         else:
@@ -218,15 +218,21 @@ def _shared(
 
 
 def through_joint(
-    mech: Mechanism, joint: Transmission, acceleration: ca.SX, torques: dict[str, Any], friction: dict[str, Any]
+    mech: Mechanism,
+    joint: Transmission,
+    at: Motion,
+    acceleration: ca.SX,
+    torques: dict[str, Any],
+    friction: dict[str, Any],
 ) -> Any:
     """Return the torque through a rigid joint on its output side, from the balance of what lies beyond it.
 
     `acceleration` (groups,); `torques` and `friction` by shaft.
     """
-    ratio = mech.topology.speed_ratio
     total: Any = 0.0
     for name in mech.topology.beyond(joint):
-        resisting = mech.drive.shaft(name).inertia * mech.shaft_speed(name, acceleration) + friction.get(name, 0.0)
-        total = total + ratio[name] / ratio[joint.to_shaft] * (resisting - torques[name])
+        turning = mech.drive.shaft(name).inertia * mech.shaft_acceleration(name, at, acceleration)
+        resisting = turning + friction.get(name, 0.0)
+        ratio = mech.speed_ratio(name, at) / mech.speed_ratio(joint.to_shaft, at)
+        total = total + ratio * (resisting - torques[name])
     return total

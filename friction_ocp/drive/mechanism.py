@@ -6,24 +6,26 @@ time-stepping form with exact sticking are both made from the same expressions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from friction_ocp.drive.control import has_integral, memory_names
+from friction_ocp.drive.inputs import TIME, input_symbols, moved_from_behind
 from friction_ocp.drive.live_terms import live_terms
-from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.drive.parts import Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.friction.modifiers import Surroundings
-from friction_ocp.parameters import is_off
 
-TIME = "/time"
-"""The input that holds the time since the start of the recording, s, in drives that depend on it: the name of the
-time axis in the file, which no channel can have."""
+ROOT_STEPS = 2
+"""Newton's steps from the mean ratio back through joints with kinematic errors."""
+
+
+def _is_constant(bend: Any) -> bool:
+    return isinstance(bend, float) and bend == 0.0
 
 
 def symbol(name: str) -> ca.SX:
@@ -159,15 +161,60 @@ class Mechanism:
 
     def shaft_angle(self, name: str, motion: Motion) -> Any:
         """Return the angle of a shaft."""
-        return motion.q[self.topology.group_of[name]] * self.topology.speed_ratio[name]
+        return self._turned(name, motion)[0]
 
-    def shaft_speed(self, name: str, v: ca.SX) -> Any:
-        """Return the speed of a shaft for group speeds `v`."""
-        return v[self.topology.group_of[name]] * self.topology.speed_ratio[name]
+    def shaft_speed(self, name: str, motion: Motion, v: ca.SX | None = None) -> Any:
+        """Return the speed of a shaft, for group speeds `v` in place of those of the motion where they are given."""
+        speeds = motion.v if v is None else v
+        return speeds[self.topology.group_of[name]] * self.speed_ratio(name, motion)
+
+    def shaft_acceleration(self, name: str, motion: Motion, acceleration: ca.SX) -> Any:
+        """Return the acceleration of a shaft for accelerations of the groups."""
+        group = self.topology.group_of[name]
+        _, ratio, bend = self._turned(name, motion)
+        along = acceleration[group] * ratio
+        return along if _is_constant(bend) else along + bend * motion.v[group] ** 2
+
+    def speed_ratio(self, name: str, motion: Motion) -> Any:
+        """Return the speed of a shaft over that of its group, which varies where a rigid joint has an error."""
+        return self._turned(name, motion)[1]
+
+    def root_motion(self, name: str, theta: Any, omega: Any) -> tuple[Any, Any]:
+        """Return angle and speed of the first shaft of a group from those of another one."""
+        group, constant = self.topology.group_of[name], self.topology.speed_ratio[name]
+        q, ratio = theta / constant, constant
+        for _ in range(ROOT_STEPS if self.has_varying_ratios(group) else 0):
+            angles = [q if g == group else 0.0 for g in range(len(self.topology.roots))]
+            none = ca.SX(0, 1)
+            angle, ratio, _ = self._turned(name, Motion(column(angles), none, none, none))
+            q = q - (angle - theta) / ratio
+        return q, omega / ratio
+
+    def has_varying_ratios(self, group: int) -> bool:
+        """Whether the speeds of the shafts of a group have ratios that vary with the angle."""
+        joints = [joint for name in self.topology.members(group) for joint, _ in self.topology.path[name]]
+        return any(joint.kinematic_error is not None for joint in joints)
+
+    def _turned(self, name: str, motion: Motion) -> tuple[Any, Any, Any]:
+        """Return the angle of a shaft, its derivative by the angle of its group, and the derivative of that."""
+        group, constant = self.topology.group_of[name], self.topology.speed_ratio[name]
+        if all(joint.kinematic_error is None for joint, _ in self.topology.path[name]):
+            return motion.q[group] * constant, constant, 0.0
+        angle, ratio, bend = motion.q[group], ca.SX(1.0), ca.SX(0.0)
+        for joint, forward in self.topology.path[name]:
+            scale = 1.0 / joint.ratio if forward else joint.ratio
+            slope, curve, error = scale, 0.0, 0.0
+            if joint.kinematic_error is not None:
+                passed = None if motion.steady is None else motion.h * motion.steady[group] * ratio
+                error = joint.kinematic_error.value(angle)
+                slope = scale + joint.kinematic_error.slope(angle, passed)
+                curve = joint.kinematic_error.bend(angle, passed)
+            angle, ratio, bend = scale * angle + error, slope * ratio, curve * ratio**2 + slope * bend
+        return angle, ratio, bend
 
     def angle_passed(self, name: str, motion: Motion) -> tuple[Any, Any]:
         """Return the angle of a shaft and what it passes in the step over which torques are averaged."""
-        passed = None if motion.steady is None else motion.h * self.shaft_speed(name, motion.steady)
+        passed = None if motion.steady is None else motion.h * self.shaft_speed(name, motion, motion.steady)
         return self.shaft_angle(name, motion), passed
 
     def surroundings(self, shaft: Shaft, motion: Motion) -> Surroundings:
@@ -175,12 +222,21 @@ class Mechanism:
         theta, passed = self.angle_passed(shaft.name, motion)
         return Surroundings(theta, passed, self.inputs.get(TIME, 0.0), self.true_input("temperature"))
 
-    def inertia(self, group: int) -> Any:
-        """Return the inertia of a group, referred to its first shaft."""
-        return sum(
-            self.drive.shaft(name).inertia * self.topology.speed_ratio[name] ** 2
+    def inertia(self, group: int, motion: Motion | None = None) -> Any:
+        """Return the inertia of a group, referred to its first shaft; without a motion that of the mean ratios."""
+        ratios = {
+            name: self.topology.speed_ratio[name] if motion is None else self.speed_ratio(name, motion)
             for name in self.topology.members(group)
-        )
+        }
+        return sum(self.drive.shaft(name).inertia * ratio**2 for name, ratio in ratios.items())
+
+    def inertial_torque(self, group: int, motion: Motion) -> Any:
+        """Return the torque on a group that its speed makes as ratios vary: half the slope of its inertia, squared."""
+        if not self.has_varying_ratios(group):
+            return 0.0
+        turned = {name: self._turned(name, motion) for name in self.topology.members(group)}
+        half = sum(self.drive.shaft(name).inertia * ratio * bend for name, (_, ratio, bend) in turned.items())
+        return half * motion.v[group] ** 2
 
     def true_input(self, measures: str) -> Any | None:
         """Return the true value behind the input channel that measures a signal; None where there is none."""
@@ -217,42 +273,6 @@ def mechanism(drive: Drive) -> Mechanism:
         for channel in drive.inputs
         if channel.part in structure.group_of and channel.signal in ("theta", "omega")
     }
-    return Mechanism(bound, structure, parameters, _inputs(live, structure), prescribed)
-
-
-def _inputs(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
-    inputs: dict[str, ca.SX] = {}
-    for channel in drive.inputs:
-        inputs[channel.name] = symbol(channel.name)
-        if _needs_slope(channel, structure):
-            inputs[f"{channel.name}'"] = symbol(f"{channel.name}'")
-    if any(_depends_on_time(shaft) for shaft in drive.shafts):
-        inputs[TIME] = symbol(TIME)
-    if findings := list(warm_up_faults(drive)):
+    if findings := list(moved_from_behind(live, structure)):
         raise FrictionOcpError(findings)
-    return inputs
-
-
-def _needs_slope(channel: Channel, structure: Topology) -> bool:
-    return channel.part in structure.group_of and channel.signal == "theta"
-
-
-def _depends_on_time(shaft: Shaft) -> bool:
-    warm_up = shaft.friction.warm_up
-    return shaft.disturbance is not None or (warm_up is not None and warm_up.amplitude is not None)
-
-
-def warm_up_faults(drive: Drive) -> Iterator[Finding]:
-    """Yield what is missing for friction that follows a temperature or settles with time."""
-    measured = any(channel.measures == "temperature" for channel in drive.inputs)
-    for shaft in drive.shafts:
-        warm_up = shaft.friction.warm_up
-        if warm_up is None:
-            continue
-        where = f"{shaft.name}.friction.warm_up"
-        if not is_off(warm_up.per_kelvin) and not measured:
-            what = "friction depends on the temperature, which no input channel measures"
-            remedy = "add a channel with measures: temperature, or leave per_kelvin out"
-            yield Finding(f"{where}.per_kelvin", what, "0 without it", remedy)
-        if not is_off(warm_up.amplitude) and warm_up.time_constant is None:
-            yield Finding(f"{where}.time_constant", "this key is missing", "s, in which the amplitude is approached")
+    return Mechanism(bound, structure, parameters, input_symbols(live, structure), prescribed)

@@ -59,7 +59,7 @@ def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
 
 
 def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
-    speed = mech.shaft_speed(motor.shaft, motion.v)
+    speed = mech.shaft_speed(motor.shaft, motion)
     return motor.torque_constant * _ripple(mech, motor, motion) * speed
 
 
@@ -122,7 +122,7 @@ def seen_by_controller(mech: Mechanism, motion: Motion) -> ControlSignals:
     controller = mech.drive.controller
     assert controller is not None
     channel = next(item for item in mech.drive.channels if item.name == controller.feedback)
-    theta, omega = mech.shaft_angle(channel.part, motion), mech.shaft_speed(channel.part, motion.v)
+    theta, omega = mech.shaft_angle(channel.part, motion), mech.shaft_speed(channel.part, motion)
     if channel.eccentricity is not None:
         theta, omega, _ = channel.eccentricity.seen((theta, omega, 0.0))
     theta, omega = theta * channel.gain + channel.offset, omega * channel.gain

@@ -17,7 +17,7 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
     q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
     deflections = [
-        shaft.friction.under(mech.surroundings(shaft, at)).steady_deflection(mech.shaft_speed(shaft.name, v))
+        shaft.friction.under(mech.surroundings(shaft, at)).steady_deflection(mech.shaft_speed(shaft.name, at))
         for shaft in mech.bristles
     ]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
@@ -47,12 +47,12 @@ def _measured_motion(mech: Mechanism, y: ca.SX, dy: ca.SX) -> tuple[ca.SX, ca.SX
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal == "alpha":
             continue
-        ratio = mech.topology.speed_ratio[channel.part]
         if channel.signal == "theta":
-            theta, omega = _seen_motion(channel, y[k], dy[k])
-            q.setdefault(group, theta / ratio)
-            v[group] = omega / ratio
+            root = mech.root_motion(channel.part, *_seen_motion(channel, y[k], dy[k]))
+            q.setdefault(group, root[0])
+            v[group] = root[1]
         else:
+            ratio = mech.topology.speed_ratio[channel.part]
             v.setdefault(group, (y[k] - channel.offset) / channel.gain / ratio)
     for group in mech.prescribed:
         v[group] = prescribed_motion(mech, group, "omega")

@@ -37,7 +37,7 @@ def reference_shaft(drive: Drive) -> str:
 
 def steady_speeds(drive: Drive) -> dict[str, float]:
     """Return the speed of every shaft of a drive with plain numbers over that of the reference shaft."""
-    stiff = tuple(replace(item, stiffness=None) for item in drive.transmissions)
+    stiff = tuple(replace(item, stiffness=None, kinematic_error=None) for item in drive.transmissions)
     joined = topology(replace(drive, transmissions=stiff))
     reference = reference_shaft(drive)
     members = joined.members(joined.group_of[reference])
@@ -65,7 +65,12 @@ def _averaged(drive: Drive) -> Drive:
             replace(item, disturbance=None, friction=replace(item.friction, ripple=None, warm_up=None))
             for item in drive.shafts
         ),
-        transmissions=tuple(replace(item, stiffness=None, damping=0.0, backlash=0.0) for item in drive.transmissions),
+        transmissions=tuple(
+            replace(
+                item, stiffness=None, damping=0.0, backlash=0.0, stiffening=0.0, hysteresis=None, kinematic_error=None
+            )
+            for item in drive.transmissions
+        ),
         motors=tuple(replace(item, cogging=None, torque_ripple=None) for item in drive.motors),
         controller=None,
         channels=(),
@@ -82,9 +87,10 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
     joints = mech.loaded_joints()
     symbols = ca.SX.sym("unknown", len(joints) + 1)
     load: dict[str, Any] = {joint.name: symbols[k] for k, joint in enumerate(joints)}
-    torques = applied_torques(mech, Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0)), 0.0)
+    at = Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0))
+    torques = applied_torques(mech, at, 0.0)
     friction = {
-        item.name: item.friction.torque(mech.shaft_speed(item.name, speeds), transmitted_torque(mech, item, load))
+        item.name: item.friction.torque(mech.shaft_speed(item.name, at), transmitted_torque(mech, item, load))
         for item in mech.drive.shafts
     }
     resisting = [topology.speed_ratio[name] * (friction[name] - torques[name]) for name in topology.members(group)]
@@ -95,7 +101,7 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
         return command
     driven = {name: torque + symbols[-1] * driving.get(name, 0.0) for name, torque in torques.items()}
     still = ca.SX.zeros(groups)
-    found = [through_joint(mech, joint, still, driven, friction) for joint in joints]
+    found = [through_joint(mech, joint, at, still, driven, friction) for joint in joints]
     return Unknown(symbols, column([*found, command])).solution[-1]
 
 

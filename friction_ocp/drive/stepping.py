@@ -66,7 +66,7 @@ class SteppedDrive:
 
 
 @dataclass(frozen=True)
-class _State:
+class State:
     """The state vector and its slices as expressions."""
 
     x: ca.SX
@@ -82,8 +82,13 @@ class _State:
         """Return the motion at an instant, the groups being at `q` with speeds `v`."""
         return Motion(q, v, self.extra, self.memory, self.lagged, self.loops)
 
+    def motion(self, mech: Mechanism) -> Motion:
+        """Return the motion of a drive in this state."""
+        return self.at(group_angles(mech, self.angles), group_speeds(mech, self.speeds))
 
-def _state(mech: Mechanism) -> _State:
+
+def state_symbols(mech: Mechanism) -> State:
+    """Return symbols for the whole state of a drive."""
     sizes = (
         len(mech.angle_groups),
         len(mech.free_groups),
@@ -94,15 +99,16 @@ def _state(mech: Mechanism) -> _State:
         len(mech.memory_names),
     )
     parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]
-    return _State(ca.vertcat(*parts), *parts)
+    return State(ca.vertcat(*parts), *parts)
 
 
 def _passes(mech: Mechanism) -> int:
     """One pass suffices where nothing but the own speed couples into the speed update."""
     controller = mech.drive.controller
     loop = bool(mech.lagging) and controller is not None and controller.sample_time is None
-    coupled = bool(mech.topology.elastic) or bool(mech.bristles) or bool(mech.extra_names) or loop
-    return 2 if coupled else 1
+    varying = any(mech.has_varying_ratios(group) for group in range(len(mech.topology.roots)))
+    coupled = mech.topology.elastic or mech.bristles or mech.extra_names
+    return 2 if coupled or loop or varying else 1
 
 
 @dataclass(frozen=True)
@@ -126,7 +132,7 @@ class _Expression:
         return ca.Function("relation", [*arguments, symbols], [self.value, found])
 
 
-def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
+def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expression:
     v0 = group_speeds(mech, state.speeds)
     free_angles = state.angles + 0.5 * h * pick(v0, mech.angle_groups)
     bristle = mech.deflections(state.bristle)
@@ -159,7 +165,7 @@ def _advance(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Express
     return _Expression(value, tuple(unknowns))
 
 
-def _advance_lags(mech: Mechanism, state: _State, at: Motion) -> tuple[ca.SX, ca.SX]:
+def _advance_lags(mech: Mechanism, state: State, at: Motion) -> tuple[ca.SX, ca.SX]:
     """Return mean and end of what follows commands late, exact under a command that is constant over the step."""
     if not mech.lagging:
         return state.lagged, state.lagged
@@ -171,7 +177,7 @@ def _advance_lags(mech: Mechanism, state: _State, at: Motion) -> tuple[ca.SX, ca
     return wanted + where(slow, share * gone, share) * behind, wanted + where(slow, 1.0 - gone, 0.0) * behind
 
 
-def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.SX:
+def _advance_extra(mech: Mechanism, state: State, at: Motion, h: ca.SX) -> ca.SX:
     """Linearly implicit midpoint step of the currents and integrals."""
     if not mech.extra_names:
         return state.extra
@@ -180,18 +186,18 @@ def _advance_extra(mech: Mechanism, state: _State, at: Motion, h: ca.SX) -> ca.S
     return cut(mech, state.extra + h * ca.solve(implicit, rates))
 
 
-def _advance_bristles(mech: Mechanism, state: _State, at: Motion, load: dict[str, Any]) -> ca.SX:
+def _advance_bristles(mech: Mechanism, state: State, at: Motion, load: dict[str, Any]) -> ca.SX:
     after: list[Any] = []
     bristle = mech.deflections(state.bristle)
     for shaft in mech.bristles:
-        omega = mech.shaft_speed(shaft.name, at.v)
+        omega = mech.shaft_speed(shaft.name, at)
         transmitted = transmitted_torque(mech, shaft, load)
         friction = shaft.friction.under(mech.surroundings(shaft, at))
         after.append(friction.advance(at.h, omega, omega, bristle[shaft.name], transmitted))
     return column(after)
 
 
-def _outputs(mech: Mechanism, state: _State, h: ca.SX, width: ca.SX) -> _Expression:
+def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expression:
     q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
     at = _observed_lags(mech, state.at(q, v), h)
     bristle = mech.deflections(state.bristle)
@@ -228,8 +234,8 @@ def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX)
 
 def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> tuple[Any, Any, Any]:
     if channel.signal in ("theta", "omega", "alpha"):
-        theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at.v)
-        alpha = mech.shaft_speed(channel.part, acceleration)
+        theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at)
+        alpha = mech.shaft_acceleration(channel.part, at, acceleration)
         if channel.eccentricity is not None:
             theta, omega, alpha = channel.eccentricity.seen((theta, omega, alpha))
         signals = {"theta": (theta, omega, alpha), "omega": (omega, alpha, 0.0), "alpha": (alpha, 0.0, 0.0)}
@@ -243,10 +249,10 @@ def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) 
     return value, 0.0, 0.0
 
 
-def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
+def _tick(mech: Mechanism, state: State, kind: ca.SX) -> ca.SX:
     controller = mech.drive.controller
     assert controller is not None
-    at = state.at(group_angles(mech, state.angles), group_speeds(mech, state.speeds))
+    at = state.motion(mech)
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
     computed, applied = compute_tick(controller, seen_by_controller(mech, at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
@@ -257,7 +263,7 @@ def _tick(mech: Mechanism, state: _State, kind: ca.SX) -> ca.SX:
 def stepped(drive: Drive) -> SteppedDrive:
     """Return the discrete-time functions of a drive."""
     mech = mechanism(drive)
-    state = _state(mech)
+    state = state_symbols(mech)
     groups = len(mech.topology.roots)
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,8 @@ class Topology:
     """Speed of each shaft over the speed of its group's first shaft."""
     elastic: tuple[Transmission, ...]
     rigid: tuple[Transmission, ...]
+    path: dict[str, tuple[tuple[Transmission, bool], ...]]
+    """Rigid joints from the first shaft of a group to each shaft, and whether each is passed from input to output."""
 
     def members(self, group: int) -> tuple[str, ...]:
         """Return the shafts of a group."""
@@ -46,10 +49,11 @@ def topology(drive: Drive) -> Topology:
     rigid = tuple(item for item in drive.transmissions if item.rigid)
     group_of: dict[str, int] = {}
     ratios: dict[str, Any] = {}
+    paths: dict[str, tuple[tuple[Transmission, bool], ...]] = {}
     roots: list[str] = []
     for shaft in drive.shafts:
         if shaft.name not in group_of:
-            _grow(shaft.name, len(roots), rigid, group_of, ratios)
+            _grow(shaft.name, len(roots), rigid, group_of, ratios, paths)
             roots.append(shaft.name)
     if len(rigid) != len(drive.shafts) - len(roots):
         names = ", ".join(item.name for item in rigid)
@@ -57,22 +61,39 @@ def topology(drive: Drive) -> Topology:
             Finding("drive.transmissions", f"rigid joints {names} form a loop", remedy="give one of them a stiffness")
         )
     elastic = tuple(item for item in drive.transmissions if not item.rigid)
-    return Topology(tuple(roots), group_of, ratios, elastic, rigid)
+    if findings := list(_backward_errors(paths)):
+        raise FrictionOcpError(findings)
+    return Topology(tuple(roots), group_of, ratios, elastic, rigid, paths)
+
+
+def _backward_errors(paths: Mapping[str, tuple[tuple[Transmission, bool], ...]]) -> Iterator[Finding]:
+    """Yield the rigid joints whose input angle, and with it their error, would follow from the output angle."""
+    backward = {joint.name: joint for path in paths.values() for joint, forward in path if not forward}
+    for name, joint in backward.items():
+        if joint.kinematic_error is not None:
+            what = f"'{joint.to_shaft}' comes before '{joint.from_shaft}' in its group of rigidly joined shafts"
+            remedy = f"list '{joint.from_shaft}' before '{joint.to_shaft}', or state a stiffness"
+            yield Finding(f"{name}.kinematic_error", what, "a rigid joint with an error leads away from it", remedy)
 
 
 def _grow(
-    root: str, group: int, rigid: tuple[Transmission, ...], group_of: dict[str, int], ratios: dict[str, Any]
+    root: str,
+    group: int,
+    rigid: tuple[Transmission, ...],
+    group_of: dict[str, int],
+    ratios: dict[str, Any],
+    paths: dict[str, tuple[tuple[Transmission, bool], ...]],
 ) -> None:
-    group_of[root], ratios[root] = group, 1.0
+    group_of[root], ratios[root], paths[root] = group, 1.0, ()
     todo = [root]
     while todo:
         here = todo.pop()
         for joint in rigid:
             if joint.from_shaft == here and joint.to_shaft not in group_of:
-                there, ratio = joint.to_shaft, ratios[here] / joint.ratio
+                there, ratio, forward = joint.to_shaft, ratios[here] / joint.ratio, True
             elif joint.to_shaft == here and joint.from_shaft not in group_of:
-                there, ratio = joint.from_shaft, ratios[here] * joint.ratio
+                there, ratio, forward = joint.from_shaft, ratios[here] * joint.ratio, False
             else:
                 continue
-            group_of[there], ratios[there] = group, ratio
+            group_of[there], ratios[there], paths[there] = group, ratio, (*paths[here], (joint, forward))
             todo.append(there)

@@ -6,7 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from friction_ocp.drive.mechanism import TIME, Mechanism, Motion, column, symbol
+from friction_ocp.drive.inputs import TIME
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
 from friction_ocp.drive.motors import cogging_torque, motor_torque
 from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.friction.smoothing import decay_means, smooth_abs, soft_threshold, where
@@ -59,7 +60,8 @@ def transfer(mech: Mechanism, item: Transmission, motion: Motion) -> Any:
 
 def twist_rate(mech: Mechanism, item: Transmission, motion: Motion, v: ca.SX) -> Any:
     """Return the rate of the twist at group speeds `v`."""
-    return transfer(mech, item, motion) * mech.shaft_speed(item.from_shaft, v) - mech.shaft_speed(item.to_shaft, v)
+    turning = transfer(mech, item, motion) * mech.shaft_speed(item.from_shaft, motion, v)
+    return turning - mech.shaft_speed(item.to_shaft, motion, v)
 
 
 def _spring_torque(item: Transmission, twist: Any, rate: Any, corner: Any) -> Any:

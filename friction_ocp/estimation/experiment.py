@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.drive.mechanism import TIME
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.errors import Finding, FrictionOcpError

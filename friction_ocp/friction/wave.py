@@ -42,3 +42,7 @@ class Wave:
         phase = rate * at
         value = rate * (self.sine * cos(phase) - self.cosine * sin(phase))
         return value if passed is None else value * sinc(0.5 * rate * passed)
+
+    def bend(self, at: Any, passed: Any = None) -> Any:
+        """Return the second derivative of the wave by x, or its mean as in `value`."""
+        return -((2.0 * math.pi / self.period) ** 2) * self.value(at, passed)

@@ -21,7 +21,7 @@ from plant import (
     Trajectory,
 )
 
-from friction_ocp.drive.mechanism import TIME
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import (
     Channel,
     Cogging,

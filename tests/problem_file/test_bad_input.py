@@ -56,6 +56,7 @@ FRICTION = f"{SHAFT}/friction"
 DUTY = {"type": "duty", "feedback": "position", "kp": 1.0}
 SECOND_SHAFT = {"name": "arm", "inertia": 0.1}
 TWO_SHAFTS = [{"name": "load", "inertia": 0.1}, SECOND_SHAFT]
+RIPPLING = {"cosine": {"guess": 0}, "sine": 0.01, "period": 1}
 LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
 
 FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
@@ -138,6 +139,24 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
             put("drive/transmissions", [{"stiffness": "rigid", "hysteresis": {"torque": 1, "twist": 0.1}}]),
         ),
         "drive.transmissions[0].hysteresis: hysteresis of a rigid transmission has no effect; state a stiffness",
+    ),
+    "error of a rigid joint backwards": (
+        several(
+            put("drive/shafts", TWO_SHAFTS),
+            put(
+                "drive/transmissions",
+                [{"from": "arm", "to": "load", "stiffness": "rigid", "kinematic_error": RIPPLING}],
+            ),
+        ),
+        "arm-load.kinematic_error: 'load' comes before 'arm' in its group of rigidly joined shafts",
+    ),
+    "moved behind an error": (
+        several(
+            put("drive/shafts", TWO_SHAFTS),
+            put("drive/transmissions", [{"stiffness": "rigid", "kinematic_error": RIPPLING}]),
+            put("channels/moved", {"measures": "arm.omega", "role": "input"}),
+        ),
+        "channels.moved: arm.omega is prescribed behind a rigid joint with a kinematic error; load.omega",
     ),
     "negative saturation": (
         put("drive/motor/saturation", -1),

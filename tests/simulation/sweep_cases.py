@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from friction_ocp.drive.mechanism import TIME
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import (
     Channel,
     Cogging,
@@ -112,7 +112,18 @@ def every_flaw_of_a_joint() -> Drive:
     return Drive(shafts, (joint,), (motor,), None, (TORQUE, *outputs("motor.theta", "load.omega", "motor.torque")))
 
 
+def rippling_ratio() -> Drive:
+    """A geared pendulum whose rigid ratio ripples and whose friction grows with the torque through the gear."""
+    shafts = (
+        Shaft("motor", 0.01, FrictionElement(STRIBECK, LoadDependence(0.1, 0.05))),
+        Shaft("load", 0.1, FrictionElement(CoulombViscous(0.05, 0.02)), Gravity(1.0)),
+    )
+    joint = Transmission("motor", "load", 3.0, kinematic_error=KinematicError(0.01, 0.02, 0.8))
+    return Drive(shafts, (joint,), (MOTOR,), None, (TORQUE, *outputs("load.theta", "load.omega")))
+
+
 DRIVES = {
+    "rippling ratio": rippling_ratio,
     "every flaw of a joint": every_flaw_of_a_joint,
     "every term": every_term,
     "one mass": one_mass,

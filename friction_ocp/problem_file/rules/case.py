@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.drive.live_terms import live_terms
 from friction_ocp.drive.parts import Channel, Drive, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.units import unit_of
@@ -90,8 +91,16 @@ class Case:
     @cached_property
     def bound(self) -> Drive:
         """The drive with plain numbers; a ratio of zero, by which nothing can be divided, is NaN."""
+        return self._with_numbers(self.drive)
+
+    @cached_property
+    def live(self) -> Drive:
+        """The same without the terms that are plainly zero, not only at their guesses."""
+        return self._with_numbers(live_terms(self.drive))
+
+    def _with_numbers(self, drive: Drive) -> Drive:
         zero = {path: np.nan for path, number in self.numbers.items() if path.endswith(".ratio") and number == 0}
-        return bind_drive(self.drive, {**self.numbers, **zero})
+        return bind_drive(drive, {**self.numbers, **zero})
 
     @cached_property
     def topology(self) -> Topology:
@@ -179,7 +188,9 @@ class Case:
 
     @cached_property
     def _without_springs(self) -> Topology:
-        return self._joined(tuple(replace(item, stiffness=None) for item in self.bound.transmissions))
+        return self._joined(
+            tuple(replace(item, stiffness=None, kinematic_error=None) for item in self.bound.transmissions)
+        )
 
     def _joined(self, transmissions: tuple[Transmission, ...]) -> Topology:
         """Return the topology under these transmissions, of single shafts where they form a loop."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from friction_ocp.drive.inputs import moved_from_behind
 from friction_ocp.drive.parts import Transmission
 from friction_ocp.drive.topology import topology
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -56,16 +57,17 @@ def shafts_hang_together(case: Case) -> Iterator[Finding]:
 
 
 def rigid_joints_form_no_loop(case: Case) -> Iterator[Finding]:
-    """Shafts in a loop of rigid joints could not move."""
+    """Shafts in a loop of rigid joints could not move; those with kinematic errors are moved from the front."""
     try:
-        topology(case.bound)
+        findings = tuple(moved_from_behind(case.live, topology(case.live)))
     except FrictionOcpError as error:
-        for finding in error.findings:
-            yield Finding(case.at(finding.where), finding.what, finding.allowed, finding.remedy)
+        findings = error.findings
+    for finding in findings:
+        yield Finding(case.at(finding.where), finding.what, finding.allowed, finding.remedy)
 
 
 def rigid_joints_have_no_play(case: Case) -> Iterator[Finding]:
-    """Damping, backlash and what else shapes the twist need a spring to act beside."""
+    """Damping, backlash and what else shapes the twist need a spring to act beside; a kinematic error does not."""
     for k, item in enumerate(case.drive.transmissions):
         if item.rigid:
             for key in _idle_numbers(item):
@@ -77,8 +79,7 @@ def rigid_joints_have_no_play(case: Case) -> Iterator[Finding]:
 
 def _idle_numbers(item: Transmission) -> list[str]:
     numbers = [key for key in ("damping", "backlash", "stiffening") if not is_off(getattr(item, key))]
-    terms = (("hysteresis", item.hysteresis), ("kinematic_error", item.kinematic_error))
-    return numbers + [key for key, term in terms if term is not None]
+    return numbers if item.hysteresis is None else [*numbers, "hysteresis"]
 
 
 def _unknown_shaft(where: str, name: str, names: list[str]) -> Finding:

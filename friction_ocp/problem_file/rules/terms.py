@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from friction_ocp.drive.inputs import warm_up_faults
 from friction_ocp.drive.live_terms import live_terms
-from friction_ocp.drive.mechanism import warm_up_faults
 from friction_ocp.drive.units import SHAFT_SIGNALS
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding
