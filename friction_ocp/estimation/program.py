@@ -14,9 +14,10 @@ import numpy as np
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.losses import AbstractLoss, Squares
+from friction_ocp.estimation.normal_equations import NormalEquations, batches
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.static_points import StaticTerm
-from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.kernel import SweepRequest, SweepResult
 from friction_ocp.simulation.sweep import Sweep
 
@@ -203,14 +204,14 @@ class Program:
         assert result.dy is not None and result.dend is not None
         _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
         states, count = nodes.shape[1], point.theta.size
-        system = _System.empty(cut.count, states, count)
+        system = NormalEquations.empty(cut.count, states, count)
         self._add_measurements(index, result, slope, system)
         self._add_gaps(cut, nodes, result, slope, system)
         self._add_start(index, point, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
-    def _add_measurements(self, index: int, result: SweepResult, slope: FloatArray, system: _System) -> None:
+    def _add_measurements(self, index: int, result: SweepResult, slope: FloatArray, system: NormalEquations) -> None:
         item, cut = self.experiments[index], self.segments[index]
         assert result.dy is not None
         errors = self.residuals(index, result.y)
@@ -218,15 +219,13 @@ class Program:
         errors = np.where(seen, errors, 0.0)
         system.cost += float(np.sum(self.loss.cost(errors[seen])))
         weight = np.where(seen, self.loss.weight(errors), 0.0)
-        for batch in _batches(cut.first):
-            rows, inside = _rows_of(cut.first, batch)
-            jacobian = result.dy[rows] / self.noise[:, None]
-            shape = (rows.shape[0], -1, result.dy.shape[2])
-            weights = (weight[rows] * inside[:, :, None]).reshape(shape[0], -1)
-            system.add(batch, jacobian.reshape(shape), errors[rows].reshape(shape[0], -1), weights, slope)
+        weight, scaled = weight / self.noise**2, errors * self.noise
+        for batch in batches(cut.first):
+            parts = (batch.take(result.dy), batch.take(scaled), batch.weights(weight))
+            system.add(batch.segments, *parts, slope)
 
     def _add_gaps(
-        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: _System
+        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: NormalEquations
     ) -> None:
         if cut.gap_weight is None or cut.count < 2:
             return
@@ -243,7 +242,7 @@ class Program:
         system.node_theta[after] -= back @ (jacobian[:, :, states:] @ slope)
         system.node_gradient[after] -= np.einsum("kij,kj->ki", back, gap)
 
-    def _add_start(self, index: int, point: Point, system: _System) -> None:
+    def _add_start(self, index: int, point: Point, system: NormalEquations) -> None:
         cut, item = self.segments[index], self.experiments[index]
         if cut.measured:
             _, slopes = self.measured_states(item, point.theta, cut.first[: cut.measured])
@@ -258,82 +257,6 @@ class Program:
                 jacobian = np.hstack([weight, -weight @ slope])[None]
                 same = np.eye(slope.shape[1])
                 system.add(slice(int(j), int(j) + 1), jacobian, error[None], np.ones((1, error.size)), same)
-
-
-@dataclass
-class _System:
-    """Normal equations of one recording while they are summed."""
-
-    cost: float
-    node_node: FloatArray
-    node_next: FloatArray
-    node_theta: FloatArray
-    node_gradient: FloatArray
-    theta_theta: FloatArray
-    theta_gradient: FloatArray
-
-    @classmethod
-    def empty(cls, segments: int, states: int, count: int) -> _System:
-        return cls(
-            0.0,
-            np.zeros((segments, states, states)),
-            np.zeros((max(segments - 1, 0), states, states)),
-            np.zeros((segments, states, count)),
-            np.zeros((segments, states)),
-            np.zeros((count, count)),
-            np.zeros(count),
-        )
-
-    def add(self, batch: slice, jacobian: FloatArray, error: FloatArray, weight: FloatArray, slope: FloatArray) -> None:
-        """Add rows of a batch of segments, each depending on its node and on the parameters.
-
-        `jacobian` (segments, rows, states + k) by node and by k numbers that move with the parameters by `slope`
-        (k, parameters); `error` and `weight` (segments, rows).
-        """
-        states = self.node_node.shape[1]
-        weighted = (jacobian * weight[:, :, None]).transpose(0, 2, 1)
-        square = weighted @ jacobian
-        gradient = np.einsum("kij,kj->ki", weighted, error)
-        self.node_node[batch] += square[:, :states, :states]
-        self.node_theta[batch] += square[:, :states, states:] @ slope
-        self.node_gradient[batch] += gradient[:, :states]
-        self.theta_theta += slope.T @ square[:, states:, states:].sum(axis=0) @ slope
-        self.theta_gradient += slope.T @ gradient[:, states:].sum(axis=0)
-
-    def fold_node(self, j: int, slope: FloatArray) -> None:
-        """Make node j a function of the parameters with derivative `slope` (states, parameters)."""
-        cross = slope.T @ self.node_theta[j]
-        self.theta_theta += cross + cross.T + slope.T @ self.node_node[j] @ slope
-        self.theta_gradient += slope.T @ self.node_gradient[j]
-        if j < len(self.node_next):
-            self.node_theta[j + 1] += self.node_next[j].T @ slope
-            self.node_next[j] = 0.0
-        self.node_node[j], self.node_theta[j], self.node_gradient[j] = np.eye(slope.shape[0]), 0.0, 0.0
-
-
-def _batches(first: IntArray) -> list[slice]:
-    """Return runs of segments of so similar length that padding them to the longest at most doubles their rows."""
-
-    def split(begin: int, stop: int) -> list[slice]:
-        longest = int(np.max(np.diff(first[begin : stop + 1]))) + 1
-        if stop - begin == 1 or longest * (stop - begin) <= 2 * int(first[stop] - first[begin]) + 2:
-            return [slice(begin, stop)]
-        middle = (begin + stop) // 2
-        return split(begin, middle) + split(middle, stop)
-
-    return split(0, len(first) - 1)
-
-
-def _rows_of(first: IntArray, batch: slice) -> tuple[IntArray, BoolArray]:
-    """Return the nodes of each segment of a batch, padded to the longest, and which of them belong to it.
-
-    The node that closes a segment belongs to the next one; the last of the recording to the last segment.
-    """
-    stops = first[1:].copy()
-    stops[-1] += 1
-    begins, ends = first[:-1][batch, None], stops[batch, None]
-    rows = begins + np.arange(int(np.max(ends - begins)))
-    return np.minimum(rows, ends - 1), rows < ends
 
 
 def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:

@@ -41,10 +41,13 @@ def program_of(
 
 
 def cuts(experiment: Experiment, samples: int) -> IntArray:
-    """Return the first nodes of segments of about `samples` intervals, the last node behind them."""
+    """Return the first nodes of segments of `samples` intervals, the last node behind them.
+
+    The last segment takes what remains, between half of that and one and a half.
+    """
     last = experiment.grid.time.size - 1
     count = max(1, round(last / samples))
-    return np.unique(np.round(np.linspace(0, last, count + 1)).astype(np.int64))
+    return np.append(samples * np.arange(count), last).astype(np.int64)
 
 
 def predictions(model: Model, experiments: Experiments, width: float) -> Program:

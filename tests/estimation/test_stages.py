@@ -27,12 +27,13 @@ def recorded(time: np.ndarray) -> Any:
 
 @given(st.integers(2, 3000), st.integers(1, 400))
 def test_segments_cover_a_recording_evenly(nodes: int, samples: int) -> None:
-    """They begin at the first node, end at the last, and differ by at most one interval in length."""
+    """They begin at the first node, end at the last, and are all as long as asked but for the last."""
     first = cuts(recorded(np.arange(nodes, dtype=float)), samples)
     lengths = np.diff(first)
     assert (first[0], first[-1]) == (0, nodes - 1)
-    assert lengths.min() >= 1 and lengths.max() - lengths.min() <= 1
-    assert len(lengths) == max(1, round((nodes - 1) / samples)) or lengths.max() == 1
+    assert np.all(lengths[:-1] == samples)
+    assert lengths[-1] <= 1.5 * samples
+    assert len(lengths) == 1 or lengths[-1] >= 0.5 * samples
 
 
 @given(st.lists(steps, min_size=20, max_size=300), st.floats(0.05, 5.0))
