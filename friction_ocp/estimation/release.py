@@ -8,11 +8,11 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.simulation.grid import FloatArray
 
-SHARES = (0.3, 1.0)
+SHARES = (0.3, 1.0, 4.0)
 """Stribeck parts over the Coulomb friction from which the released parameters start."""
 HIGHEST = 0.7
 """Highest start of a break or a Stribeck speed over the top speed."""
-RELEASES = ((0.02, 0.3), (0.04, 0.6), (0.2, 1.0), (1.0, 1.5))
+RELEASES = ((0.05, 0.4), (0.2, 0.8), (1.0, 1.5))
 """Pairs of Stribeck speed and highest break speed, over the typical speed, from which released parameters start."""
 
 
@@ -38,14 +38,18 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
 def _released_value(
     model: Model, name: str, known: dict[str, float], places: tuple[float, float], share: float, default: float
 ) -> float:
-    """Return a start that leaves the friction at the typical speed as the nested model has it."""
+    """Return a start that leaves the friction at the typical speed as the nested model has it.
+
+    There exp(-place^-2) of the Stribeck part is left (exponent 2), and the Coulomb part gives up as much.
+    """
     (place, highest_break), (stem, _, last) = places, name.partition("@")[0].rpartition(".")
+    remaining = 1.0 / (1.0 + share * float(np.exp(-(place**-2.0))))
     if ".tau_s" in name:
-        return (1.0 + share) * known.get(name.replace(".tau_s", ".tau_c"), default)
+        return (1.0 + share) * remaining * known.get(name.replace(".tau_s", ".tau_c"), default)
     if name.endswith(".load.stribeck"):
-        return share * known.get(f"{stem}.coulomb", default)
+        return share * remaining * known.get(f"{stem}.coulomb", default)
     if name in known:
-        return (1.0 - share * min(1.0, place)) * known[name] if _is_coulomb(name) else known[name]
+        return remaining * known[name] if _is_coulomb(name) else known[name]
     speed = _typical_speed(model, name)
     if ".omega_s" in name:
         return place * speed

@@ -46,7 +46,7 @@ def test_released_starts_keep_the_friction_far_above_the_stribeck_speed(stribeck
     names = stribeck.space.names
     for start in starts[1 : 1 + len(SHARES)]:
         values = dict(zip(names, start, strict=True))
-        assert values["motor.friction.tau_c"] == pytest.approx(0.3, rel=RELEASES[0][0] * max(SHARES) + 1e-9)
+        assert values["motor.friction.tau_c"] == pytest.approx(0.3)
         assert values["motor.friction.tau_s"] > values["motor.friction.tau_c"]
 
 
