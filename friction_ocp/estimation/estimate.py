@@ -25,7 +25,7 @@ from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
-from friction_ocp.estimation.static_points import StaticFit, static_fit
+from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, whiteness
@@ -150,9 +150,10 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     theta = solution.point.theta
     found = influence(fitted.program, solution.point)
     residuals = _residual_tests(fitted)
-    white = all(test.white for tests in residuals.values() for test in tests.values())
-    doubt = uncertainty(model.space, theta, found, white, problem.estimation.loss == "absolute")
     simulation = simulate_model(model, theta)
+    missed = [fit for fit in simulation.static if fit.split == "train" and misses_points(fit)]
+    white = all(test.white for tests in residuals.values() for test in tests.values()) and not missed
+    doubt = uncertainty(model.space, theta, found, white, problem.estimation.loss == "absolute")
     parameters = _parameter_estimates(model, theta, doubt, verdicts(model.space, theta, doubt))
     return Estimate(
         problem=problem,
@@ -163,7 +164,10 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         simulation=simulation,
         residuals=residuals,
         curves=friction_curves(model, theta, doubt.covariance, simulation.train),
-        warnings=warnings_of(solution, parameters, doubt, residuals, simulation),
+        warnings=(
+            *warnings_of(solution, parameters, doubt, residuals, simulation),
+            *(_missed_warning(fit) for fit in missed),
+        ),
         solver=SolverFacts(
             problem.estimation.solver,
             solution.iterations,
@@ -172,6 +176,13 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
             solution.objective,
             problem.estimation.starts,
         ),
+    )
+
+
+def _missed_warning(fit: StaticFit) -> str:
+    return (
+        f"The static points {fit.name} are missed by {fit.noise_ratio:.3g} times their standard errors: the model "
+        "misses something at constant speed, and the standard errors are the robust (sandwich) ones."
     )
 
 

@@ -83,6 +83,16 @@ class StaticFit:
         return float(np.sqrt(np.mean(((self.predicted - self.measured) / self.std_error) ** 2)))
 
 
+MISFIT = 5.0
+"""Standard deviations beyond what scatter explains from which static points show that the model misses something."""
+
+
+def misses_points(fit: StaticFit) -> bool:
+    """Return whether the errors of static points are larger than their standard errors explain."""
+    count = fit.speed.size
+    return fit.noise_ratio**2 > 1.0 + MISFIT * float(np.sqrt(2.0 / count))
+
+
 def static_fit(
     term: StaticTerm, space: ParameterSpace, theta: FloatArray, split: Literal["train", "validation"]
 ) -> StaticFit:

@@ -103,6 +103,8 @@ def test_a_parabola_does_not_explain_a_break() -> None:
     estimate = fitted("quadratic_on_polyline")
     curve = next(fit for fit in estimate.simulation.static if fit.name == "curve")
     assert curve.noise_ratio > 5.0
+    assert any("The static points curve are missed by" in text for text in estimate.warnings)
+    assert estimate.uncertainty.kind == "sandwich"
 
 
 @pytest.mark.slow
