@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import gap_weights
+from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program, Segments
@@ -19,6 +20,9 @@ ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)
 WIDTHS = (0.1, 0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the
 first: there a wide smoothing only invents slopes and breaks at low speed."""
+
+NO_GAP = 1e-7
+"""Standard deviation of a gap over the typical size of its state where segments stand for one free run."""
 
 Experiments = tuple[Experiment, ...]
 
@@ -64,6 +68,21 @@ def relaxed(model: Model, experiments: Experiments, width: float, loss: Abstract
         first = cuts(item, model.problem.estimation.segment)
         segments.append(_with_start(model, Segments(first, gap_weights(model, item, first))))
     return program_of(model, experiments, tuple(segments), width, loss)
+
+
+def along_measurement(model: Model) -> Program:
+    """Return short segments along the measured motion, joined as the fit joins them, friction smoothed widely.
+
+    A free run is joined by gaps of next to nothing: to first order the segments then move as one.
+    """
+    segments: list[Segments] = []
+    for item in model.train:
+        first = cuts(item, model.problem.estimation.segment)
+        weight = gap_weights(model, item, first)
+        if fits_free_run(model):
+            weight = np.tile(np.diag(1.0 / (NO_GAP * model.state_scale)), (len(first) - 2, 1, 1))
+        segments.append(_with_start(model, Segments(first, weight)))
+    return program_of(model, model.train, tuple(segments), WIDTHS[0], Squares())
 
 
 def free_run(

@@ -10,6 +10,7 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.problem_file.rules import (
     dissipation,
     excitation,
+    foresight,
     recordings,
     signals,
     static,
@@ -28,8 +29,9 @@ WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 
 def check(problem: Problem) -> tuple[Finding, ...]:
     """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file."""
-    doubts = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-    return _run(Case(problem), (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
+    case, doubts = Case(problem), (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
+    found = _run(case, (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
+    return found if _errors(found) else (*found, *foresight.recordings_tell_the_parameters(case))
 
 
 def check_file(problem: Problem) -> tuple[Finding, ...]:

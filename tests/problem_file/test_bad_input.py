@@ -394,6 +394,22 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [{"guess": 900}]}),
         "drive.shafts[0].friction.breaks[0]: break 900 rad/s is above the greatest speed in training",
     ),
+    "Stribeck speed never seen": (
+        put(f"{FRICTION}/omega_s", {"guess": 1e-6, "min": 0}),
+        "drive.shafts[0].friction.omega_s: 'load' moves below 2 times the Stribeck speed of 1e-06 rad/s in 0 training",
+    ),
+    "presliding between two samples": (
+        put(FRICTION, {**LUGRE, "sigma0": {"guess": 1e9}}),
+        "drive.shafts[0].friction.sigma0: 'load' is within 2e-09 rad after a reversal in 0 training samples; at least",
+    ),
+    "less than a period": (
+        put("drive/motor/cogging", {"cosine": {"guess": 0.01}, "sine": {"guess": 0.01}, "period": 100}),
+        "'load' travels 1.75 rad in training; more than a period, 100 rad; record more travel",
+    ),
+    "scale that nothing fixes": (
+        put("drive/motor/torque_constant", {"guess": 0.5, "min": 0.1, "max": 2}),
+        "load.friction.viscous / motor.torque_constant, but not ",
+    ),
     "gravity over a small angle": (
         put(f"{SHAFT}/gravity", {"torque": {"guess": 1}, "phase": {"guess": 0}}),
         "torque and phase of gravity cannot be told apart",
