@@ -83,7 +83,7 @@ def _spread(rows: FloatArray) -> float:
 
 def _solved_for(relative: FloatArray) -> tuple[int, ...]:
     """Return as many members as there are directions, the last ones through which all directions are well seen."""
-    count, directions = relative.shape
+    count, directions = int(relative.shape[0]), int(relative.shape[1])
     if not 0 < directions < count:
         return ()
     scaled: FloatArray = relative / np.linalg.norm(relative, axis=0)
