@@ -8,7 +8,7 @@ from itertools import combinations as subsets
 
 import numpy as np
 
-from friction_ocp.estimation.foresight import Doubt, Survey, blind_directions, information
+from friction_ocp.estimation.foresight import Doubt, Survey, blind_directions
 from friction_ocp.simulation.grid import FloatArray
 
 NEGLIGIBLE = 0.03
@@ -43,15 +43,16 @@ def told(seen: Survey, doubt: Doubt) -> tuple[Combination, ...]:
     over several points it is not the coefficients that stay but the relative ones, the combination is a product.
     """
     names = [seen.space.names[k] for k in doubt.members]
-    directions = [blind_directions(information(system), doubt.members) for system in seen.systems]
-    sizes = [seen.sizes(number)[list(doubt.members)] for number in range(len(seen.points))]
+    views = seen.by_sight(doubt)
+    directions = [blind_directions(view.information, doubt.members) for view in views]
+    sizes = [view.sizes[list(doubt.members)] for view in views]
     solved = _solved_for(directions[0] / sizes[0][:, None])
     if not solved:
         return ()
     same = [k for k, found in enumerate(directions) if found.shape == directions[0].shape]
     relative = [_coefficients(directions[k] / sizes[k][:, None], solved) for k in same]
     rows = [k for k in range(len(names)) if k not in solved]
-    values = np.array([seen.points[k].theta[list(doubt.members)] for k in same])
+    values = np.array([views[k].point.theta[list(doubt.members)] for k in same])
     found: list[Combination] = []
     for row, leading in enumerate(rows):
         kept = [j for j in range(len(solved)) if abs(relative[0][row, j]) > NEGLIGIBLE]

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import CONDITION_INDEX, Verdict, verdicts
+from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
-from friction_ocp.estimation.stages import along_measurement
+from friction_ocp.estimation.stages import WIDTHS, along_measurement, free_run
 from friction_ocp.estimation.uncertainty import NO_INFORMATION, SMALLEST_INFORMATION, Uncertainty
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
@@ -24,23 +26,43 @@ WORTH_A_WORD = 0.1
 
 
 @dataclass(frozen=True)
-class Survey:
-    """The program along the measured motion, linearised at the guess and at points around it."""
+class View:
+    """A program linearised at one point."""
 
     program: Program
-    points: tuple[Point, ...]
-    """The guess first."""
-    systems: tuple[Linearisation, ...]
+    point: Point
+    system: Linearisation
+
+    @property
+    def information(self) -> FloatArray:
+        """Return (parameters, parameters) the information about the parameters, node states solved for."""
+        return information(self.system)
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Return the magnitude of each parameter, its typical size where it is zero."""
+        return np.where(self.point.theta != 0, np.abs(self.point.theta), self.program.space.scale)
+
+    @property
+    def errors(self) -> FloatArray:
+        """Return (parameters,) expected standard errors over these sizes."""
+        return expected(self.information).std_error / self.sizes
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the recordings tell near the guesses, in several views; the guess itself comes first."""
+
+    views: tuple[View, ...]
 
     @property
     def space(self) -> ParameterSpace:
         """The fitted parameters."""
-        return self.program.space
+        return self.views[0].program.space
 
-    def sizes(self, number: int) -> FloatArray:
-        """Return the magnitude of each parameter at a point, its typical size where it is zero."""
-        theta = self.points[number].theta
-        return np.where(theta != 0, np.abs(theta), self.space.scale)
+    def by_sight(self, doubt: Doubt) -> tuple[View, ...]:
+        """Return the views, those that tell the members of a doubt best coming first."""
+        return tuple(sorted(self.views, key=lambda view: float(np.max(view.errors[list(doubt.members)]))))
 
 
 @dataclass(frozen=True)
@@ -53,24 +75,23 @@ class Doubt:
 
 
 def survey(model: Model) -> Survey | None:
-    """Linearise a problem near its guesses; None where the simulation breaks down at the guess.
+    """Linearise a problem near its guesses; None where the simulation breaks down in every view.
 
-    Every segment starts from the measured motion, so that a poor guess spoils nothing but sizes, and friction is
-    smoothed as widely as at the start of a fit.
+    No view is right everywhere, and each can miss what another sees. Along the measured motion a poor guess spoils
+    nothing but sizes: friction taken exactly may stick there, smoothed widely it hides what happens at low speed. What
+    no channel shows, such as the twist of a spring seen by an accelerometer alone, moves only in the free run.
     """
-    program = along_measurement(model)
-    points: list[Point] = []
-    systems: list[Linearisation] = []
+    programs = [along_measurement(model, width) for width in (0.0, WIDTHS[0])]
+    programs.append(free_run(model, model.train, 0.0, Squares(), horizon(model)))
+    views: list[View] = []
     for theta in _thetas(model.space):
-        point = Point(theta, program.suggested_nodes(theta))
-        with np.errstate(all="ignore"):
-            system = program.linearise(point)
-        if np.isfinite(system.objective) and np.all(np.isfinite(system.theta_theta)):
-            points.append(point)
-            systems.append(system)
-        elif not points:
-            return None
-    return Survey(program, tuple(points), tuple(systems))
+        for program in programs:
+            point = Point(theta, program.suggested_nodes(theta))
+            with np.errstate(all="ignore"):
+                system = program.linearise(point)
+            if np.isfinite(system.objective) and np.all(np.isfinite(system.theta_theta)):
+                views.append(View(program, point, system))
+    return Survey(tuple(views)) if views else None
 
 
 def _thetas(space: ParameterSpace) -> list[FloatArray]:
@@ -103,10 +124,10 @@ def judged(space: ParameterSpace, sizes: FloatArray, found: FloatArray) -> tuple
 
 
 def doubts(seen: Survey) -> tuple[Doubt, ...]:
-    """Return what is in doubt at every point of a survey, each parameter once."""
-    words = [judged(seen.space, seen.sizes(number), information(system)) for number, system in enumerate(seen.systems)]
+    """Return what is in doubt in every view of a survey, each parameter once."""
+    words = [judged(seen.space, view.sizes, view.information) for view in seen.views]
     doubtful = {k for k in range(len(seen.space.names)) if all(word[k].word != "ok" for word in words)}
-    unseen = {k for k in doubtful if words[0][k].word == "not_identifiable"}
+    unseen = {k for k in doubtful if all(word[k].word == "not_identifiable" for word in words)}
     index = {name: k for k, name in enumerate(seen.space.names)}
     groups = [Doubt((k,), True) for k in sorted(unseen)]
     left = doubtful - unseen
@@ -114,7 +135,7 @@ def doubts(seen: Survey) -> tuple[Doubt, ...]:
         members, front = set[int](), {min(left)}
         while front:
             members |= front
-            front = {index[name] for k in front for name in words[0][k].traded_with} & left - members
+            front = {index[name] for k in front for word in words for name in word[k].traded_with} & left - members
         left -= members
         if len(members) > 1:
             groups.append(Doubt(tuple(sorted(members)), False))
@@ -122,12 +143,8 @@ def doubts(seen: Survey) -> tuple[Doubt, ...]:
 
 
 def _is_vague(seen: Survey, doubt: Doubt) -> bool:
-    """Whether at every point some member is expected to be known badly."""
-    members = list(doubt.members)
-    return all(
-        np.max((expected(information(system)).std_error / seen.sizes(number))[members]) > WORTH_A_WORD
-        for number, system in enumerate(seen.systems)
-    )
+    """Whether in every view some member is expected to be known badly."""
+    return all(np.max(view.errors[list(doubt.members)]) > WORTH_A_WORD for view in seen.views)
 
 
 def blind_directions(found: FloatArray, members: tuple[int, ...]) -> FloatArray:

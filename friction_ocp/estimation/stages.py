@@ -70,8 +70,8 @@ def relaxed(model: Model, experiments: Experiments, width: float, loss: Abstract
     return program_of(model, experiments, tuple(segments), width, loss)
 
 
-def along_measurement(model: Model) -> Program:
-    """Return short segments along the measured motion, joined as the fit joins them, friction smoothed widely.
+def along_measurement(model: Model, width: float) -> Program:
+    """Return short segments along the measured motion, joined as the fit joins them.
 
     A free run is joined by gaps of next to nothing: to first order the segments then move as one.
     """
@@ -82,7 +82,7 @@ def along_measurement(model: Model) -> Program:
         if fits_free_run(model):
             weight = np.tile(np.diag(1.0 / (NO_GAP * model.state_scale)), (len(first) - 2, 1, 1))
         segments.append(_with_start(model, Segments(first, weight)))
-    return program_of(model, model.train, tuple(segments), WIDTHS[0], Squares())
+    return program_of(model, model.train, tuple(segments), width, Squares())
 
 
 def free_run(

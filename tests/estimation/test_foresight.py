@@ -91,11 +91,11 @@ def test_friction_behind_a_rigid_gear_is_told_only_in_sum() -> None:
     (doubt,) = doubts(found)
     (combination,) = told(found, doubt)
     assert combination.text({"ratio": 15050.0}) == "motor.friction.tau_c + load.friction.tau_c / 15050"
-    added = probes(found.program, found.points[0], found.systems[0], drive)
+    view = found.by_sight(doubt)[0]
+    added = probes(view.program, view.point, view.system, drive)
     assert {"load.theta", "motor.omega", "drive.torque"} <= {probe.measures for probe in added}
     for probe in added:
-        error = expected(information(probe.system)).std_error / found.sizes(0)
-        assert np.max(error[list(doubt.members)]) > 1.0
+        assert np.max(replace(view, system=probe.system).errors[list(doubt.members)]) > 1.0
 
 
 def test_a_scale_that_nothing_fixes_is_told_as_a_product() -> None:
@@ -147,8 +147,9 @@ def test_a_channel_that_is_recommended_tells_what_it_promised() -> None:
     assert {"motor.friction.viscous", "load.friction.viscous"} <= {found.space.names[k] for k in doubt.members}
     estimate, alone = identify(elastic_problem(ENCODER)), identify(item)
     found = at_answer(item, np.array([entry.value for entry in estimate.parameters]))
-    before = expected(information(found.systems[0])).std_error
-    added = {p.measures: p for p in probes(found.program, found.points[0], found.systems[0], item.drive)}
+    view = found.views[0]
+    before = expected(view.information).std_error
+    added = {p.measures: p for p in probes(view.program, view.point, view.system, item.drive)}
     probe = added["load.theta"]
     assert probe.noise_std == pytest.approx(ENCODER.noise_std, rel=0.3)
     promised = expected(information(probe.system)).std_error
@@ -165,6 +166,6 @@ def test_the_expected_errors_are_those_of_the_fit(seed: int) -> None:
     item = fitted_axis(measured_axis(seed))
     estimate = identify(item)
     found = at_answer(item, np.array([entry.value for entry in estimate.parameters]))
-    foreseen = expected(information(found.systems[0])).std_error
+    foreseen = expected(found.views[0].information).std_error
     ratio = foreseen / np.array([entry.std_error for entry in estimate.parameters])
     assert np.all((ratio > 1 / 1.5) & (ratio < 1.5))
