@@ -40,10 +40,10 @@ def told(seen: Survey, doubt: Doubt) -> tuple[Combination, ...]:
     """Return the combinations of traded parameters that the recordings do tell.
 
     A change that leaves the recordings alone is a vector n; the combinations are the rows orthogonal to all n. Where
-    over several points it is not the coefficients that stay but the relative ones, the combination is a product.
+    over several views it is not the coefficients that stay but the relative ones, the combination is a product.
     """
     names = [seen.space.names[k] for k in doubt.members]
-    views = seen.by_sight(doubt)
+    views = sorted(seen.by_sight(doubt), key=lambda view: blind_directions(view.information, doubt.members).shape[1])
     directions = [blind_directions(view.information, doubt.members) for view in views]
     sizes = [view.sizes[list(doubt.members)] for view in views]
     solved = _solved_for(directions[0] / sizes[0][:, None])

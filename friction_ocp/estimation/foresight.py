@@ -21,6 +21,9 @@ NEARBY = 2
 """Points beside the guess: what is doubtful at all of them is so by the recordings, not by the guess."""
 SPREAD = 1.5
 """Factor by which their parameters differ from the guess at most."""
+FEW_STEPS, MANY_STEPS = 300_000, 1_000_000
+"""Integrator steps of all recordings up to which points beside the guess are looked at, and up to which anything is:
+a check takes seconds."""
 WORTH_A_WORD = 0.1
 """Relative standard error from which a parameter that is traded for others raises a doubt."""
 
@@ -75,16 +78,19 @@ class Doubt:
 
 
 def survey(model: Model) -> Survey | None:
-    """Linearise a problem near its guesses; None where the simulation breaks down in every view.
+    """Linearise a problem near its guesses; None where no view can be had.
 
     No view is right everywhere, and each can miss what another sees. Along the measured motion a poor guess spoils
     nothing but sizes: friction taken exactly may stick there, smoothed widely it hides what happens at low speed. What
     no channel shows, such as the twist of a spring seen by an accelerometer alone, moves only in the free run.
     """
+    steps = sum(int(np.sum(item.grid.substeps)) for item in model.train)
+    if steps > MANY_STEPS:
+        return None
     programs = [along_measurement(model, width) for width in (0.0, WIDTHS[0])]
     programs.append(free_run(model, model.train, 0.0, Squares(), horizon(model)))
     views: list[View] = []
-    for theta in _thetas(model.space):
+    for theta in _thetas(model.space)[: None if steps <= FEW_STEPS else 1]:
         for program in programs:
             point = Point(theta, program.suggested_nodes(theta))
             with np.errstate(all="ignore"):
