@@ -399,8 +399,8 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         "drive.shafts[0].friction.omega_s: 'load' moves below 2 times the Stribeck speed of 1e-06 rad/s in 0 training",
     ),
     "presliding between two samples": (
-        put(FRICTION, {**LUGRE, "sigma0": {"guess": 1e6}}),
-        "drive.shafts[0].friction.sigma0: 'load' is within 2e-06 rad after a reversal in 0 training samples; at least",
+        put(FRICTION, {**LUGRE, "sigma0": {"guess": 1e7}}),
+        "drive.shafts[0].friction.sigma0: 'load' is within 2e-07 rad after a reversal in 0 training samples; at least",
     ),
     "less than a period": (
         put("drive/motor/cogging", {"cosine": {"guess": 0.01}, "sine": {"guess": 0.01}, "period": 100}),
