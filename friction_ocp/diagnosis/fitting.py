@@ -121,7 +121,16 @@ def farther(values: Mapping[str, float], augmentation: Augmentation) -> dict[str
 
 
 def completed(fitted: FittedModel) -> FittedModel:
-    """Continue a refit to its end."""
+    """Continue a refit to its end.
+
+    Free runs have local minima that a few steps from the base model's answer do not leave: they are fitted as the base
+    model was, from there.
+    """
+    if fitted.footing.segment_s is None and fitted.theta.size:
+        model = fitted.model
+        theta = fit(replace(model, space=model.space.moved(fitted.theta))).solution.point.theta
+        thorough = polished(model, fitted.footing, theta, None)
+        return min(thorough, fitted, key=lambda item: item.objective)
     return polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes)
 
 
@@ -172,10 +181,10 @@ def held_out(fitted: FittedModel) -> FloatArray:
 def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
     program, point = fitted.linear.program, fitted.linear.point
     count = len(program.experiments)
-    groups = np.array_split(np.arange(count), min(count, MOST_FOLDS))
+    groups = _folds(fitted)
     costs: dict[int, FloatArray] = {}
     for group in groups:
-        others = [k for k in range(count) if not np.any(group == k)]
+        others = [k for k in range(count) if k not in group]
         rest = replace(
             program,
             experiments=tuple(program.experiments[k] for k in others),
@@ -183,11 +192,28 @@ def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
         )
         start = Point(point.theta, tuple(point.nodes[k] for k in others))
         theta = solve_gauss_newton(rest, start, FOLD).point.theta if others else point.theta
-        for k in [int(one) for one in group]:
+        for k in group:
             alone = _only(program, k)
             costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (point.nodes[k],)), STEPS_FROM_HELD_OUT))
     found = [costs[k] for k in range(count)]
     return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
+
+
+def _folds(fitted: FittedModel) -> list[list[int]]:
+    """Return the recordings that are left out together.
+
+    Those made under the same conditions, where the problem states different ones (`set`): a model that only fits two
+    conditions at once does not carry over to a third. Neighbours otherwise.
+    """
+    names = [item.name for item in fitted.linear.program.experiments]
+    stated = {use.name: tuple(sorted(use.set.items())) for use in fitted.model.problem.train}
+    conditions = [stated.get(name, ()) for name in names]
+    kinds = sorted(set(conditions))
+    if len(kinds) < 2:
+        parts = np.array_split(np.arange(len(names)), min(len(names), MOST_FOLDS))
+        return [[int(k) for k in part] for part in parts]
+    shared = np.array_split(np.arange(len(kinds)), min(len(kinds), MOST_FOLDS))
+    return [[k for k, kind in enumerate(conditions) if kinds.index(kind) in part] for part in shared]
 
 
 def _only(program: Program, index: int) -> Program:

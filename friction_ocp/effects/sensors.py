@@ -51,6 +51,10 @@ class SensorOffsetEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 
+PLAUSIBLE = 1.5
+"""Factor by which a scale may be wrong: a larger one is a wrong unit, which every simulation shows at once."""
+
+
 class SensorGainEffect(AbstractEffect):
     """The channel records a multiple of what it should."""
 
@@ -62,7 +66,7 @@ class SensorGainEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         gain, path = float(channel(drive, place).gain), f"{place}.gain"
-        low, high = sorted((0.3 * gain, 3.0 * gain))
+        low, high = sorted((gain / PLAUSIBLE, gain * PLAUSIBLE))
         added = change_channel(drive, place, gain=Free(gain, low, high))
         return Augmentation(added, {path: gain}, (Trial(({path: 1.02 * gain},)),))
 

@@ -44,7 +44,10 @@ def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         return fitted
     rng = np.random.default_rng(model.problem.estimation.seed)
     size = mean_error(program, best.point)
-    softer = [replace(program, loss=Absolute(rounding * size)) for rounding in ROUNDINGS[2:-1]]
+    softer = [
+        replace(program, loss=Absolute(rounding * size), width=width * model.speed_scale)
+        for rounding, width in zip(ROUNDINGS[2:-1], DETOURS, strict=True)
+    ]
     for k, hop in enumerate(HOPS):
         watch = phases.begin(f"hop {k + 1} of {len(HOPS)}")
         reduced = reduce_system(program.linearise(best.point), 1e-6)

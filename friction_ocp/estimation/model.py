@@ -29,6 +29,9 @@ STEP_PER_RADIAN = 0.05
 STEP_PER_DECAY = 0.1
 """Integrator step over the shortest decay time."""
 
+MOST_STEPS = 1000
+"""Integrator steps in a usual sampling interval: beyond them the guesses make no sense."""
+
 
 @dataclass(frozen=True)
 class SpeedRange:
@@ -242,7 +245,9 @@ def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem
         fastest = float(np.max(np.abs(rates.imag), initial=0.0))
         decay = float(np.max(-rates.real, initial=0.0))
         longest = min(longest, STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6))
-    return longest
+    intervals = [np.diff(channel.time) for use in problem.train for channel in use.recording.channels.values()]
+    usual = min((float(np.median(steps)) for steps in intervals if steps.size), default=0.0)
+    return max(longest, usual / MOST_STEPS)
 
 
 def slowest_period(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
