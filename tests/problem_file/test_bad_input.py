@@ -65,6 +65,10 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         "drive.shafts[0].inerta: unknown key 'inerta'; available: name, inertia, friction, gravity, external_torque, "
         "motion, disturbance; did you mean 'inertia'?",
     ),
+    "fitted delay of an input": (
+        put("channels/current/delay", {"guess": 0.0, "min": -0.01, "max": 0.01}),
+        "channels.current.delay: current is an input, and its delay cannot be fitted; a number; fit the delay of the",
+    ),
     "unknown key of a law": (put(f"{FRICTION}/sigma0", 1.0), "drive.shafts[0].friction.sigma0: unknown key 'sigma0'; "),
     "unknown law": (
         put(FRICTION, {"law": "lugree", "tau_c": 1}),

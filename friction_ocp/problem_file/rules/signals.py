@@ -192,6 +192,17 @@ def duty_controller_has_a_supply(case: Case) -> Iterator[Finding]:
             yield Finding(case.at("controller"), what, allowed, "or type: p, whose output is the voltage itself")
 
 
+def delays_of_inputs_are_known(case: Case) -> Iterator[Finding]:
+    """The clock of an input is shifted before the fit; a shift to be found is that of the outputs against it."""
+    for channel in case.drive.inputs:
+        if not isinstance(channel.delay, (int, float)):
+            where = case.at(f"channels.{channel.name}.delay")
+            what = f"{channel.name} is an input, and its delay cannot be fitted"
+            yield Finding(
+                where, what, "a number", "fit the delay of the outputs instead: late inputs are early outputs"
+            )
+
+
 def delay_needs_a_sample_time(case: Case) -> Iterator[Finding]:
     """Only a sampled controller can be late."""
     controller = case.drive.controller
@@ -219,6 +230,7 @@ SIGNALS: tuple[Rule, ...] = (
     roles_fit_signals,
     inputs_are_single,
     motors_are_driven_once,
+    delays_of_inputs_are_known,
     delay_needs_a_sample_time,
     process_noise_acts_on_shafts,
 )
