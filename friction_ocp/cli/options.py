@@ -48,11 +48,11 @@ def output_folder(options: argparse.Namespace) -> Path:
 
 def checked(options: argparse.Namespace) -> Problem:
     """Load a problem; refuse errors, show warnings."""
-    from friction_ocp.problem_file.check import check
+    from friction_ocp.problem_file.check import check_before_fit
     from friction_ocp.problem_file.load import load_problem
 
     problem = load_problem(options.problem)
-    findings = check(problem)
+    findings = check_before_fit(problem)
     errors = [finding for finding in findings if finding.severity == "error"]
     if errors:
         raise FrictionOcpError(errors)

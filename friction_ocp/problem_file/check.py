@@ -28,10 +28,18 @@ WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 
 
 def check(problem: Problem) -> tuple[Finding, ...]:
-    """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file."""
-    case, doubts = Case(problem), (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-    found = _run(case, (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
-    return found if _errors(found) else (*found, *foresight.recordings_tell_the_parameters(case))
+    """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file.
+
+    What the recordings cannot tell comes last, and only where nothing is wrong.
+    """
+    found = check_before_fit(problem)
+    return found if _errors(found) else (*found, *foresight.recordings_tell_the_parameters(Case(problem)))
+
+
+def check_before_fit(problem: Problem) -> tuple[Finding, ...]:
+    """Return the same without what a fit finds out itself: what the recordings cannot tell."""
+    doubts = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
+    return _run(Case(problem), (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
 
 
 def check_file(problem: Problem) -> tuple[Finding, ...]:
