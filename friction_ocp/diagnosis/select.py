@@ -42,7 +42,8 @@ class Choice:
     nothing: float
     """Probability that none is better than no addition at all."""
     significant: bool
-    """Whether the best rival's held-out gain is positive at the level asked for."""
+    """Whether the held-out gain of the best rival is positive at the level asked for; or, where none stands out by
+    itself, that of whichever is best, the level being shared among them (Bonferroni)."""
     aliases: tuple[Rival, ...]
     """The best rival and all whose difference to it is within its own scatter."""
 
@@ -76,20 +77,27 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
     wins = np.bincount(np.argmax(totals, axis=1), minlength=len(ordered) + 1) + 1.0 / (len(ordered) + 1)
     shares = wins / wins.sum()
     best = totals[:, 1]
-    significant = bool(np.quantile(best, level) > 0)
+    alone = bool(np.quantile(best, level) > 0)
+    some = bool(shares[0] < level / len(ordered))
     aliases = [
         rival
         for k, rival in enumerate(ordered)
-        if k == 0 or (np.quantile(best - totals[:, k + 1], level) <= 0 < np.quantile(totals[:, k + 1], level))
+        if k == 0 or (np.quantile(best - totals[:, k + 1], level) <= 0 < _least(totals[:, k + 1], level, alone))
     ]
     order = sorted(range(len(ordered)), key=lambda k: -float(shares[k + 1]))
     return Choice(
         tuple(ordered[k] for k in order),
         tuple(float(shares[k + 1]) for k in order),
         float(shares[0]),
-        significant,
+        alone or (some and len(aliases) > 1),
         tuple(sorted(aliases, key=lambda rival: -shares[ordered.index(rival) + 1])),
     )
+
+
+def _least(gains: FloatArray, level: float, alone: bool) -> float:
+    """Return the gain of a rival that must be positive for it to be an alias: at the level, or where no rival reaches
+    that by itself, on average."""
+    return float(np.quantile(gains, level) if alone else np.mean(gains))
 
 
 def probabilities(choice: Choice, gap: bool) -> Mapping[str, float]:

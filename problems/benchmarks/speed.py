@@ -2,10 +2,10 @@
 
 python problems/benchmarks/speed.py [--samples 10000] [--starts 20] [--long] [--ipopt]
 
-Two-mass telescope axis with polyline and with LuGre friction, data of the plant, starts up to a factor sqrt(10) off: how many
-starts reach the best optimum, the median and worst time of a fit, and the floor beside it: one value-and-sensitivity
-sweep times the iterations. Compilation is printed apart. `--long` fits 10^4, 10^5 and 10^6 samples, each in a process of
-its own, and prints time, time per iteration and peak memory with the exponent of growth.
+Two-mass telescope axis with polyline and with LuGre friction, data of the plant, starts up to a factor sqrt(10) off:
+how many starts reach the best optimum, the median and worst time of a fit, and the floor beside it: one
+value-and-sensitivity sweep times the iterations. Compilation is printed apart. `--long` fits 10^4, 10^5 and 10^6
+samples, each in a process of its own, and prints time, time per iteration and peak memory with the exponent of growth.
 """
 
 from __future__ import annotations
