@@ -13,13 +13,14 @@ import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import engine
 import servo
 import yaml
 from checks import Check, print_check, status
 
 LINES = Path(__file__).with_name("done_when.yaml")
 Measure = Callable[[str, bool], Check]
-MEASURES: Mapping[str, Mapping[str, Measure]] = {"servo": servo.MEASURES}
+MEASURES: Mapping[str, Mapping[str, Measure]] = {"servo": servo.MEASURES, "engine": engine.MEASURES}
 """By piece of work and ID: (line, quick) -> check."""
 
 
