@@ -14,7 +14,7 @@ settings.load_profile("steady")
 
 @pytest.fixture(autouse=True)
 def _signals_as_they_were() -> Iterator[None]:
-    """Undo the handlers that the command line installs; Ctrl-C works even where a shell started the tests deaf to it."""
+    """Undo the handlers that the command line installs; Ctrl-C works even where the shell had switched it off."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
