@@ -22,6 +22,8 @@ def bode_figure(frequency: FloatArray, responses: Responses, title: str, unit: s
         size.loglog(frequency, np.abs(response), color=colour(k), linewidth=1.6, label=label)
         degrees = np.degrees(np.unwrap(np.angle(response)))
         phase.semilogx(frequency, degrees, color=colour(k), linewidth=1.6)
+    for axis in (size.xaxis, size.yaxis, phase.xaxis):
+        axis.set_major_formatter("{x:g}")
     size.set_title(title)
     size.set_ylabel(f"magnitude in {unit}")
     size.legend()

@@ -51,6 +51,7 @@ def gap_map_figure(cells: Sequence[Json]) -> Figure:
     axes.set_yticks(np.arange(len(labels)), [f"{channel}: {regime}" for channel, regime in labels])
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
     axes.set_title("Where the gap is")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
@@ -90,7 +91,7 @@ def ranking_figure(number: int, causes: Sequence[Json]) -> Figure:
     axes.set_yticks(places, names)
     axes.set_xlabel("share of the excess error that the candidate takes away")
     axes.set_title(f"What competes, round {number}")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    axes.legend(loc="best")
     axes.axvline(0.0, color=MUTED, linewidth=1.0)
     axes.invert_yaxis()
     return figure

@@ -75,8 +75,15 @@ def _named(item: Json) -> str:
 
 
 def _closed(closed: Json) -> str:
-    low, high = (percent(float(end)) for end in closed["interval95"])
-    return f"{percent(float(closed['overall']))} of the excess error is gone ({low} to {high})"
+    """Say how much of the gap is gone where the candidate was not fitted, and when that is nothing to rely on."""
+    overall, ends = float(closed["overall"]), [float(end) for end in closed["interval95"]]
+    low, high = (percent(end) for end in ends)
+    if ends[1] < 0.0:
+        return (
+            f"the excess error on recordings left out grows by {percent(-overall)} ({low} to {high}): do not rely on it"
+        )
+    doubt = "" if ends[0] > 0.0 else ", not certainly any"
+    return f"{percent(overall)} of the excess error is gone ({low} to {high}{doubt})"
 
 
 def _listed(items: Sequence[str]) -> str:
