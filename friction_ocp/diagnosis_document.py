@@ -20,7 +20,7 @@ from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
-from friction_ocp.result_document import provenance
+from friction_ocp.result_document import heading, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
 
@@ -31,13 +31,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "status": "diagnosed",
-        "title": problem.title,
-        "question": problem.question,
-        "problem": problem.path.name if problem.path else "",
-        "recordings": {
-            "train": [use.name for use in problem.train],
-            "validation": [use.name for use in problem.validation],
-        },
+        **heading(problem),
         "verdict": diagnosis.verdict,
         "where": _where(diagnosis),
         "rounds": [_round(diagnosis, item) for item in diagnosis.rounds],

@@ -36,7 +36,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
         "format": FORMAT,
         "status": "converged" if estimate.converged else "not_converged",
         "message": estimate.message,
-        **_heading(estimate.problem),
+        **heading(estimate.problem),
         "warnings": list(estimate.warnings),
         "parameters": {item.name: _parameter(item) for item in estimate.parameters},
         "fit": _fit(estimate.simulation),
@@ -73,7 +73,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "format": SIMULATION_FORMAT,
         "status": "simulated",
         "message": "free-running simulation with the values of the problem file",
-        **_heading(simulation.problem),
+        **heading(simulation.problem),
         "warnings": [],
         "parameters": {},
         "fit": _fit(simulation),
@@ -82,7 +82,8 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-def _heading(problem: Problem) -> dict[str, Any]:
+def heading(problem: Problem) -> dict[str, Any]:
+    """Return what every result says first: the question, and the recordings that it was put to."""
     return {
         "title": problem.title,
         "question": problem.question,

@@ -13,12 +13,14 @@ import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel, Motor
-from friction_ocp.estimation.experiment import Experiment, with_inputs
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
 from friction_ocp.estimation.losses import AbstractLoss, Squares
-from friction_ocp.estimation.model import Model, standstill_slope, typical_inputs
+from friction_ocp.estimation.model import Model, seen_by, standstill_slope, typical_inputs
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program, Segments
+from friction_ocp.estimation.stages import windows
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 linalg: Any = _linalg  # its own types are incomplete
@@ -67,10 +69,8 @@ class Footing:
         return self.program(model, tuple(self._regridded(item, model) for item in self.train))
 
     def _regridded(self, item: Experiment, model: Model) -> Experiment:
-        substeps = np.maximum(1, np.ceil(item.grid.dt / model.max_step - 1e-9)).astype(np.int64)
-        item = replace(item, grid=replace(item.grid, substeps=substeps))
-        recording = next(use.recording for use in model.problem.recordings if use.name == item.name)
-        return with_inputs(item, self.inputs, model.drive.input_names, recording)
+        stepped = replace(item, grid=item.grid.with_step(model.max_step))
+        return seen_by(model, model.drive, stepped, self.inputs)
 
     def _segments(self, model: Model, item: Experiment) -> Segments:
         impulses = {} if self.segment_s is None else input_impulses(model, item, self.numbers[item.name])
@@ -88,12 +88,8 @@ class Footing:
 
 def cuts(item: Experiment, seconds: float | None) -> IntArray:
     """Return the first nodes of segments of about `seconds`, the last node behind them."""
-    time = item.grid.time
-    if seconds is None:
-        return np.array([0, time.size - 1], dtype=np.int64)
-    count = int(np.clip(round((time[-1] - time[0]) / seconds), 1, MOST_SEGMENTS))
-    edges: FloatArray = np.linspace(float(time[0]), float(time[-1]), count + 1)
-    return np.unique(np.clip(np.searchsorted(time, edges - 1e-9), 0, time.size - 1)).astype(np.int64)
+    duration = float(item.grid.time[-1] - item.grid.time[0])
+    return windows(item, None if seconds is None else max(seconds, duration / MOST_SEGMENTS))
 
 
 def pieces(item: Experiment, count: int) -> list[Experiment]:
@@ -175,12 +171,8 @@ def group_density(model: Model, foot: Footing, recording: str) -> FloatArray:
     """Return the density of the acceleration noise of every group, rad/s^2/sqrt(Hz)."""
     mech = model.drive.mechanism
     numbers = _known_numbers(model, foot, recording)
-    power = [ca.SX(0.0) for _ in mech.topology.roots]
-    for shaft, density in foot.density.items():
-        power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
-    function = ca.Function("power", list(mech.parameters.values()), [ca.vertcat(*power)])
-    values = np.asarray(function(*(numbers.get(name, 1.0) for name in mech.parameters))).ravel()
-    return np.sqrt(values) / np.maximum(group_inertias(mech, numbers), 1e-300)
+    values = np.array([numbers.get(name, 1.0) for name in mech.parameters])
+    return acceleration_noise(mech, foot.density, values)
 
 
 def unit_covariances(model: Model, foot: Footing, recording: str, spans: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.parameters import Free
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -188,6 +189,20 @@ def change_channel(drive: Drive, name: str, **changes: Any) -> Drive:
 def transmission(drive: Drive, name: str) -> Transmission:
     """Return the transmission called `name`."""
     return next(item for item in drive.transmissions if item.name == name)
+
+
+RANGE = 1e3
+"""Bounds of an added parameter over its first guess."""
+
+
+def either_way(size: float) -> Free:
+    """Return a parameter that may have either sign."""
+    return Free(size, -RANGE * size, RANGE * size)
+
+
+def upwards(size: float) -> Free:
+    """Return a parameter that is not negative."""
+    return Free(size, 0.0, RANGE * size)
 
 
 def motor_of(drive: Drive, shaft: str) -> Motor | None:

@@ -7,7 +7,16 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    change_shaft,
+    either_way,
+    moving_shafts,
+    upwards,
+)
 from friction_ocp.friction.composite import Bend, StribeckRise, added_terms, plain_law, viscous_part, with_added
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip
@@ -54,7 +63,7 @@ class StribeckEffect(AbstractEffect):
         speed = clues.typical_speed(place)
         speeds = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
         guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
-        rise = StribeckRise(Free(size, 0.0, 1e3 * size), guess, 2.0)
+        rise = StribeckRise(upwards(size), guess, 2.0)
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.omega_s": omega_s}) for omega_s in speeds)
         added = with_friction(drive, drive.shaft(place), stribeck=rise)
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)
@@ -76,7 +85,7 @@ class PolylineBreakEffect(AbstractEffect):
         path, fastest = f"{place}.friction.added.bend", max(clues.speed_quantiles(place, (0.98,))[0], 1e-12)
         slope = SHARE * clues.typical_torque[place] / fastest
         breaks = clues.speed_quantiles(place, (0.2, 0.35, 0.5, 0.65, 0.8, 0.9))
-        bend = Bend(Free(slope, -1e3 * slope, 1e3 * slope), Free(breaks[2], 0.02 * fastest, fastest))
+        bend = Bend(either_way(slope), Free(breaks[2], 0.02 * fastest, fastest))
         trials = tuple(Trial(({f"{path}.slope": slope},), {f"{path}.speed": speed}) for speed in breaks)
         added = with_friction(drive, drive.shaft(place), bend=bend)
         return Augmentation(added, {f"{path}.slope": 0.0}, trials)
@@ -97,7 +106,7 @@ class QuadraticDragEffect(AbstractEffect):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         path = f"{place}.friction.added.quadratic"
         size = SHARE * clues.typical_torque[place] / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12) ** 2
-        added = with_friction(drive, drive.shaft(place), quadratic=Free(size, -1e3 * size, 1e3 * size))
+        added = with_friction(drive, drive.shaft(place), quadratic=either_way(size))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 
@@ -130,4 +139,4 @@ class AsymmetryEffect(AbstractEffect):
 
 def _odd(path: str, size: float) -> Directional:
     """Return a term that is added in one direction and taken off in the other."""
-    return Directional(Free(size, -1e3 * size, 1e3 * size), Tie(f"-1 * {path}"))
+    return Directional(either_way(size), Tie(f"-1 * {path}"))

@@ -8,7 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Drive, Hysteresis, KinematicError, Transmission
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_transmission, transmission
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    change_transmission,
+    transmission,
+    upwards,
+)
 from friction_ocp.effects.periodic import wave
 from friction_ocp.parameters import Free, is_off
 
@@ -27,7 +35,7 @@ class BacklashEffect(AbstractEffect):
         torque = clues.typical_torque[item.to_shaft]
         twist = torque / max(clues.numbers[f"{place}.stiffness"], 1e-300)
         plays = [0.1 * twist, 0.5 * twist, 2.0 * twist]
-        added = change_transmission(drive, place, backlash=Free(twist, 0.0, 1e3 * twist))
+        added = change_transmission(drive, place, backlash=upwards(twist))
         return Augmentation(added, {path: 0.0}, tuple(Trial(({path: play},)) for play in plays))
 
 
@@ -98,7 +106,7 @@ class TransmissionHysteresisEffect(AbstractEffect):
         torque, twist = _twist(drive, transmission(drive, place), clues)
         path, size = f"{place}.hysteresis", 0.05 * torque
         twists = [0.05 * twist, 0.3 * twist, 2.0 * twist]
-        loop = Hysteresis(Free(size, 0.0, 1e3 * size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
+        loop = Hysteresis(upwards(size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
         added = change_transmission(drive, place, hysteresis=loop)
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.twist": one}) for one in twists)
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Drive, Motor
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_motor, motor_of
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_motor, motor_of, upwards
 from friction_ocp.parameters import Free, is_off
 
 
@@ -49,5 +49,5 @@ class TorqueSaturationEffect(AbstractEffect):
         largest = max(float(np.max(np.abs(track.torque[motor.name]))) for track in clues.tracks)
         current = max(largest, 1e-12) / max(abs(clues.numbers.get(f"{motor.name}.torque_constant", 1.0)), 1e-300)
         size, path = 0.2 / current**2, f"{motor.name}.saturation"
-        added = change_motor(drive, motor.name, saturation=Free(size, 0.0, 1e3 * size))
+        added = change_motor(drive, motor.name, saturation=upwards(size))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from friction_ocp.drive.parts import Cogging, Disturbance, Drive, Eccentricity, TorqueRipple
+from friction_ocp.drive.parts import Cogging, Disturbance, Drive, Eccentricity, Motor, TorqueRipple
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
@@ -15,6 +15,7 @@ from friction_ocp.effects.effect import (
     change_channel,
     change_motor,
     change_shaft,
+    either_way,
     motor_of,
     moving_shafts,
 )
@@ -22,15 +23,12 @@ from friction_ocp.effects.friction_curve import SHARE, is_dry
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.parameters import Free
 
-WIDE = 1e3
-"""Bound of an amplitude over the size of its trial."""
-
 
 def wave(
     kind: type[Any], path: str, size: float, periods: list[float]
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with free amplitudes and period, its off values and a trial for each period."""
-    amplitude = Free(size, -WIDE * size, WIDE * size)
+    amplitude = either_way(size)
     period = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
     paths = [f"{path}.{part}" for part in ("cosine", "sine")]
     trials = tuple(Trial(tuple({name: size} for name in paths), {f"{path}.period": each}) for each in periods)
@@ -52,6 +50,12 @@ class PositionRippleEffect(AbstractEffect):
         return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
 
 
+def _driven(drive: Drive) -> dict[str, Motor]:
+    """Return the motor on every moving shaft that has one."""
+    motors = {motor.shaft: motor for motor in drive.motors}
+    return {shaft.name: motors[shaft.name] for shaft in moving_shafts(drive) if shaft.name in motors}
+
+
 class CoggingEffect(AbstractEffect):
     """Torque periodic in the motor angle."""
 
@@ -59,10 +63,7 @@ class CoggingEffect(AbstractEffect):
     sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        motors = {motor.shaft: motor for motor in drive.motors}
-        return [
-            shaft.name for shaft in moving_shafts(drive) if shaft.name in motors and motors[shaft.name].cogging is None
-        ]
+        return [name for name, motor in _driven(drive).items() if motor.cogging is None]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         motor = motor_of(drive, place)
@@ -79,9 +80,7 @@ class TorqueRippleEffect(AbstractEffect):
     sentence: ClassVar[str] = "the motor's torque ripples with its angle, in proportion to the current"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        motors = {motor.shaft: motor for motor in drive.motors}
-        free = [shaft.name for shaft in moving_shafts(drive) if shaft.name in motors]
-        return [name for name in free if motors[name].torque_ripple is None]
+        return [name for name, motor in _driven(drive).items() if motor.torque_ripple is None]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         motor = motor_of(drive, place)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Channel, Drive
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_channel, channel
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_channel, channel, either_way
 from friction_ocp.parameters import Free
 
 _ANALOG = ("theta", "omega", "alpha", "current", "current_command", "torque", "voltage")
@@ -47,7 +47,7 @@ class SensorOffsetEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         size, path = 0.02 * _size(channel(drive, place), clues), f"{place}.offset"
-        added = change_channel(drive, place, offset=Free(size, -1e3 * size, 1e3 * size))
+        added = change_channel(drive, place, offset=either_way(size))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 

@@ -9,7 +9,15 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Drive, ExternalTorque, Gravity, Shaft, Transmission
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    change_shaft,
+    either_way,
+    moving_shafts,
+)
 from friction_ocp.effects.friction_curve import SHARE
 from friction_ocp.parameters import Free
 
@@ -26,7 +34,7 @@ class UnbalanceEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         size, torque, phase = SHARE * clues.typical_torque[place], f"{place}.gravity.torque", f"{place}.gravity.phase"
-        gravity = Gravity(Free(size, -1e3 * size, 1e3 * size), Free(0.0, -2.0 * np.pi, 2.0 * np.pi))
+        gravity = Gravity(either_way(size), Free(0.0, -2.0 * np.pi, 2.0 * np.pi))
         added = change_shaft(drive, place, gravity=gravity)
         trials = tuple(Trial(({torque: size},), {phase: angle}) for angle in np.pi * np.arange(8) / 8)
         return Augmentation(added, {torque: 0.0, phase: 0.0}, trials)
@@ -43,7 +51,7 @@ class ConstantTorqueEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         size, path = SHARE * clues.typical_torque[place], f"{place}.external_torque.constant"
-        added = change_shaft(drive, place, external_torque=ExternalTorque(Free(size, -1e3 * size, 1e3 * size)))
+        added = change_shaft(drive, place, external_torque=ExternalTorque(either_way(size)))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 

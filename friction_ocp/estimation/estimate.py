@@ -10,7 +10,6 @@ import numpy as np
 
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
@@ -18,7 +17,7 @@ from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.losses import Squares
-from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.model import Model, prepare, prepare_fit
 from friction_ocp.estimation.noise import NoiseFloor
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
@@ -116,10 +115,7 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     iterate, on Ctrl-C. A fit that did not converge is returned with `converged` False and says why in `message`.
     """
     began = time.perf_counter()
-    model = prepare(problem)
-    if not model.space.names:
-        where = str(problem.path or problem.title)
-        raise FrictionOcpError(Finding(where, "nothing to fit", "a parameter with {guess: ...} is fitted"))
+    model = prepare_fit(problem)
     built = time.perf_counter()
     reports: list[Report] = []
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 
+from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.simulation.grid import FloatArray, IntArray
@@ -48,11 +51,18 @@ def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
 
 
 def _group_noise(model: Model, item: Experiment) -> FloatArray:
-    """Return the density of the acceleration noise of each group, referred to its first shaft, rad/s^2/sqrt(Hz)."""
-    mech = model.drive.mechanism
+    numbers = model.space.numbers(model.space.guess, item.name)
+    return acceleration_noise(model.drive.mechanism, model.problem.estimation.process_noise, numbers)
+
+
+def acceleration_noise(mech: Mechanism, densities: Mapping[str, float], numbers: FloatArray) -> FloatArray:
+    """Return the density of the acceleration noise of each group, referred to its first shaft, rad/s^2/sqrt(Hz).
+
+    `densities` of torque by shaft, N m/sqrt(Hz); `numbers` (parameters,) of the drive.
+    """
     power = [ca.SX(0.0) for _ in mech.topology.roots]
-    for shaft, density in model.problem.estimation.process_noise.items():
+    for shaft, density in densities.items():
         power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
-    spread: list[ca.SX] = [ca.sqrt(power[group]) / mech.inertia(group) for group in range(len(power))]
+    spread: list[ca.SX] = [ca.sqrt(power[k]) / ca.fmax(mech.inertia(k), 1e-300) for k in range(len(power))]
     function = ca.Function("noise", [ca.vertcat(*mech.parameters.values())], [ca.vertcat(*spread)])
-    return np.asarray(function(model.space.numbers(model.space.guess, item.name))).ravel()
+    return np.asarray(function(numbers)).ravel()

@@ -177,8 +177,9 @@ def trial_step(
     )
     theta = space.clip(point.theta + step)
     step = theta - point.theta
-    nodes = tuple(old + move for old, move in zip(point.nodes, reduced.node_steps(step), strict=True))
-    return Point(theta, nodes), _predicted(system, step, reduced.node_steps(step))
+    moves = reduced.node_steps(step)
+    nodes = tuple(old + move for old, move in zip(point.nodes, moves, strict=True))
+    return Point(theta, nodes), _predicted(system, step, moves)
 
 
 def _constraint_rows(space: ParameterSpace, theta: FloatArray) -> tuple[FloatArray, FloatArray]:

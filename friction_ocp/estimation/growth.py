@@ -20,6 +20,7 @@ from friction_ocp.estimation.rounds import (
     Plan,
     final_solver,
     is_noise,
+    is_sound,
     limits,
     prediction,
     race,
@@ -105,8 +106,7 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
         start = _better_start(model, program, program.point_along(fitted.program, fitted.solution.point))
         solution = final_solver(model)(program, start, limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
-    inside = not model.space.at_bounds(fitted.solution.point.theta).any()
-    return Growth(fitted, inside and is_noise(fitted.program, fitted.solution) and _joined_at_no_cost(before, fitted))
+    return Growth(fitted, is_sound(model, fitted) and _joined_at_no_cost(before, fitted))
 
 
 def _better_start(model: Model, program: Program, point: Point) -> Point:

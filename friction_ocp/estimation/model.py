@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -13,7 +13,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.steady import steady_speeds
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import bind_drive
-from friction_ocp.errors import FrictionOcpError
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
@@ -106,6 +106,15 @@ def prepare(problem: Problem) -> Model:
     )
 
 
+def prepare_fit(problem: Problem) -> Model:
+    """Prepare a problem that is to be fitted; raises FrictionOcpError also where nothing has a guess."""
+    model = prepare(problem)
+    if not model.space.names:
+        where = str(problem.path or problem.title)
+        raise FrictionOcpError(Finding(where, "nothing to fit", "a parameter with {guess: ...} is fitted"))
+    return model
+
+
 def with_drive(model: Model, drive: Drive) -> Model:
     """Return the same recordings seen by another drive of the same channels; floors and node times stay."""
     problem = replace(model.problem, drive=drive)
@@ -142,17 +151,19 @@ def with_step(model: Model, max_step: float) -> Model:
     return replace(model, train=train, validation=validation, max_step=max_step)
 
 
-def seen_by(model: Model, drive: SteppedDrive, item: Experiment) -> Experiment:
-    """Return a recording of a model, or a piece of one, with the inputs of another drive of the same channels."""
+def seen_by(model: Model, drive: SteppedDrive, item: Experiment, known: Sequence[str] | None = None) -> Experiment:
+    """Return a recording, or a piece of one, with the inputs of another drive of the same channels.
+
+    `known` are the inputs that it has; None for those of the model.
+    """
     recording = next(use.recording for use in model.problem.recordings if use.name == item.name)
-    return with_inputs(item, model.drive.input_names, drive.input_names, recording)
+    return with_inputs(item, model.drive.input_names if known is None else known, drive.input_names, recording)
 
 
 def _with_step(item: Experiment, max_step: float, known: float) -> Experiment:
     if max_step >= known:
         return item
-    substeps = np.maximum(1, np.ceil(item.grid.dt / max_step - 1e-9)).astype(np.int64)
-    return replace(item, grid=replace(item.grid, substeps=substeps))
+    return replace(item, grid=item.grid.with_step(max_step))
 
 
 def _try_experiment(

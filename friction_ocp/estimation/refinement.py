@@ -13,6 +13,7 @@ from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import Fitted, limits
+from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
 
 SHIFT = 0.1
@@ -49,10 +50,8 @@ def _shift(coarse: Program, fine: Program, point: Point) -> FloatArray:
     free = ~coarse.space.at_bounds(point.theta)
     systems = [program.linearise(point) for program in (coarse, fine)]
     reduced = [reduce_system(system, 1e-9) for system in systems]
-    information = reduced[0].hessian[np.ix_(free, free)]
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    move = inverse @ (scale * (reduced[1].gradient - reduced[0].gradient)[free])
+    told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
+    move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
     samples = sum(int(np.isfinite(item.measured).sum()) for item in coarse.experiments)
     misfit = max(1.0, 2.0 * systems[0].objective / max(samples, 1))
-    return np.abs(move) / np.sqrt(np.maximum(np.diag(inverse), 1e-300) * misfit)
+    return np.abs(move) / np.sqrt(np.maximum(np.diag(told), 1e-300) * misfit)

@@ -83,7 +83,7 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     conclusive = plan.conclusive and model.problem.estimation.loss == "squares"
     if conclusive:
         at_once = _rounds(model, replace(plan, widths=plan.widths[-1:]), [model.space.guess], "direct fit", phases)
-        if _is_sound(model, at_once[0]):
+        if is_sound(model, at_once[0]):
             return at_once
     simple = nested_space(model.problem, model.space)
     plain = _plain_starts(model, phases)
@@ -92,7 +92,7 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     exact = replace(plan, widths=RELEASED_WIDTHS)
     if conclusive:
         direct = _rounds(model, exact, plain[1:], "direct fit", phases)
-        if _is_sound(model, direct[0]):
+        if is_sound(model, direct[0]):
             return direct
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
@@ -150,7 +150,7 @@ def is_noise(program: Program, end: Solution) -> bool:
     return end.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
 
 
-def _is_sound(model: Model, fitted: Fitted) -> bool:
+def is_sound(model: Model, fitted: Fitted) -> bool:
     """Whether residuals are noise and no parameter ran into a bound."""
     inside = not np.any(model.space.at_bounds(fitted.solution.point.theta))
     return inside and is_noise(fitted.program, fitted.solution)

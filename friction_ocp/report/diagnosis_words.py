@@ -79,9 +79,8 @@ def _closed(closed: Json) -> str:
     overall, ends = float(closed["overall"]), [float(end) for end in closed["interval95"]]
     low, high = (percent(end) for end in ends)
     if ends[1] < 0.0:
-        return (
-            f"the excess error on recordings left out grows by {percent(-overall)} ({low} to {high}): do not rely on it"
-        )
+        grown = f"{percent(-overall)} ({percent(-ends[1])} to {percent(-ends[0])})"
+        return f"the excess error on recordings left out grows by {grown}: do not rely on it"
     doubt = "" if ends[0] > 0.0 else ", not certainly any"
     return f"{percent(overall)} of the excess error is gone ({low} to {high}{doubt})"
 

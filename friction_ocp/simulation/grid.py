@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,14 @@ class Grid:
         """(n,) interval lengths; the last is 0."""
         return np.append(np.diff(self.time), 0.0)
 
+    def with_step(self, max_step: float) -> Grid:
+        """Return the same nodes with integrator steps of at most `max_step` s."""
+        return replace(self, substeps=_substeps(self.dt, max_step))
+
+
+def _substeps(dt: FloatArray, max_step: float) -> IntArray:
+    return np.maximum(1, np.ceil(dt / max_step - 1e-9)).astype(np.int64)
+
 
 def controller_ticks(controller: Controller | None, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the times at which a sampled controller computes and at which its commands are applied.
@@ -96,7 +104,7 @@ def build_grid(
     starts, ends, nodes = (_sample(inputs, time, kind, tolerance) for kind in ("start", "end", "node"))
     return Grid(
         time=time,
-        substeps=np.maximum(1, np.ceil(dt / max_step - 1e-9)).astype(np.int64),
+        substeps=_substeps(dt, max_step),
         ticks=(_marks(time, compute, tolerance) * COMPUTE + _marks(time, apply, tolerance) * APPLY).astype(np.int64),
         at_start=starts,
         at_end=ends,

@@ -42,9 +42,7 @@ def answer(problem: Problem, execution: Execution) -> Answer:
 
 def concluded(blank: Workshop, outcome: Outcome) -> Answer:
     """Return the estimate that belongs to the optimum in an outcome."""
-    optimum = Optimum.read(outcome.value)
-    workshop = Workshop(blank.problem, optimum)
-    workshop.__dict__["model"] = blank.model
+    workshop = blank.at(Optimum.read(outcome.value))
     return Answer(workshop, conclude(workshop.model, workshop.fitted, 0.0, outcome.seconds))
 
 

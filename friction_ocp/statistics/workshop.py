@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.model import Model, prepare_fit
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.execution.content import fingerprint
@@ -24,11 +23,7 @@ class Workshop:
     @cached_property
     def model(self) -> Model:
         """The problem made ready to compute."""
-        model = prepare(self.problem)
-        if not model.space.names:
-            where = str(self.problem.path or self.problem.title)
-            raise FrictionOcpError(Finding(where, "nothing to fit", "a parameter with {guess: ...} is fitted"))
-        return model
+        return prepare_fit(self.problem)
 
     @cached_property
     def fitted(self) -> Fitted:
@@ -43,6 +38,13 @@ class Workshop:
         uses = [[_content(use) for use in part] for part in (problem.train, problem.validation)]
         optimum = None if self.optimum is None else self.optimum.document()
         return fingerprint(problem.drive, uses, problem.constraints, problem.estimation, optimum)
+
+    def at(self, optimum: Optimum) -> Workshop:
+        """Return the same problem at its optimum, with the model if that is built."""
+        moved = Workshop(self.problem, optimum)
+        if "model" in self.__dict__:
+            moved.__dict__["model"] = self.model
+        return moved
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind what is built: model functions belong to their process."""

@@ -41,7 +41,6 @@ HERE = Path(__file__).resolve()
 ROOT = HERE.parents[2]
 VALUES, FINEST = 7, 1e-3
 JUDGED = ("c0h", "c1h", "c2h", "R c0l", "R c1l")
-NEEDED_SHARE = 0.05
 Numbers = dict[str, float]
 
 
