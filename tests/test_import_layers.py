@@ -33,7 +33,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
 RANK = {name: rank for rank, row in enumerate(LAYERS) for name in row}
 
 CONFINED: dict[str, tuple[str, ...]] = {
-    "h5py": ("recording/hdf5.py",),
+    "h5py": ("recording/hdf5.py", "recording/matlab_hdf5.py"),
     "yaml": ("problem_file/", "recording/import_map.py"),
     "pydantic": ("problem_file/",),
     "pydantic_core": ("problem_file/",),

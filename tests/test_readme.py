@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
+import tomllib
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -18,6 +19,7 @@ from friction_ocp.friction import registry
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.problem_file.check import check
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.import_map import load_import_map
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 EXAMPLE_LINES = 25
@@ -87,6 +89,21 @@ def test_the_law_that_it_adds_needs_one_class_and_one_line(tmp_path: Path, monke
     assert [str(finding) for finding in check(problem) if finding.severity == "error"] == []
     simulation = simulate(problem)
     assert simulation.train_errors["position"][0].rms < 1.0
+
+
+def test_the_map_that_it_shows_is_read(tmp_path: Path) -> None:
+    """The map of an import is one, with three clocks."""
+    (tmp_path / "map.yaml").write_text(blocks("yaml")[0], encoding="utf-8")
+    import_map = load_import_map(tmp_path / "map.yaml")
+    assert list(import_map.channels) == ["position", "current", "speed"]
+    assert import_map.channels["current"].time is not None
+
+
+def test_the_extras_that_it_names_exist() -> None:
+    """Every `friction-ocp[extra]` is an extra of this project."""
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = set(re.findall(r"friction-ocp\[(\w+)\]", README))
+    assert named and named <= project["optional-dependencies"].keys()
 
 
 def test_the_command_table_is_that_of_the_parser() -> None:

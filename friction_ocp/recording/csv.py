@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -14,9 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.quantities import dimension_of
+from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, no_clock
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray, Recording
-from friction_ocp.recording.table import Table, recording_of
+from friction_ocp.recording.table import recording_of
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
@@ -38,51 +41,58 @@ class Layout:
     decimal: str = "."
 
 
-@dataclass(frozen=True)
-class ColumnSummary:
-    """What one column of a file looks like."""
-
-    name: str
-    examples: tuple[str, ...]
-    numbers: int
-    """How many cells hold a number."""
-
-
-@dataclass(frozen=True)
-class CsvSummary:
-    """What a delimited file holds, for whoever is about to write its map."""
-
-    delimiter: str
-    columns: tuple[ColumnSummary, ...]
-    """In the order of the file: a column's place is its index."""
-    rows: int
-    rate: float | None
-    """Rows per unit of the first increasing column (median), or None."""
-
-
 def read_csv(path: str | Path, import_map: ImportMap) -> Recording:
     """Read the mapped columns of delimited text into a recording in SI units."""
     path = Path(path)
-    layout = sniff_layout(path, import_map.delimiter, import_map.decimal)
-    return recording_of(Table(layout.names, partial(_read_columns, path, layout)), import_map, path)
+    with open_csv(path, import_map) as file:
+        return recording_of(file, import_map, path)
 
 
-def inspect_csv(path: str | Path, delimiter: str | None = None, decimal: str = ".") -> CsvSummary:
-    """List the columns of delimited text with examples, how many rows there are and their rate."""
-    path = Path(path)
-    layout = sniff_layout(path, delimiter, decimal)
+@contextmanager
+def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
+    """List the columns of delimited text; how many rows there are is told from the size of the file.
+
+    Without a map, which would say what has to be a number, whatever is none is left out.
+    """
+    stated = import_map or ImportMap(None, {})
+    layout = sniff_layout(path, stated.delimiter, stated.decimal)
+    rows, summary = _estimated_rows(path), f"delimiter {layout.delimiter!r}"
+    signals = [Signal(name, rows, _bracketed_unit(name)) for name in layout.names]
+    if import_map is not None:
+        yield ForeignFile(tuple(signals), partial(_read_columns, path, layout), no_clock, summary)
+        return
+    check_sizes(path, signals)
+    values = _whatever_is_a_number(path, layout)
+    known = [
+        replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
+        for signal, column in zip(signals, values, strict=True)
+    ]
+    yield ForeignFile(tuple(known), lambda wanted: {k: values[k] for k in wanted}, no_clock, summary)
+
+
+def _estimated_rows(path: Path) -> int:
+    with path.open("rb") as file:
+        head = file.read(65_536)
+    return path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1)
+
+
+def _bracketed_unit(header: str) -> str:
+    """Return the unit in "angle [deg]" or "angle (deg)", "" where there is none."""
+    match = re.search(r"[\[(]([^\[\]()]+)[\])]\s*$", header)
+    if match is None:
+        return ""
+    try:
+        dimension_of(match[1])
+    except FrictionOcpError:
+        return ""
+    return "" if match[1].strip().isdigit() else match[1].strip()
+
+
+def _whatever_is_a_number(path: Path, layout: Layout) -> FloatArray:
+    """Return (columns, rows), NaN for everything else."""
     width = len(layout.names)
-    first = [cells for _, cells in islice(_rows(path, layout), 3) if len(cells) == width]
     chunks = [_numbers(cells, layout.decimal)[0] for _, cells in _chunks(path, layout, range(width), [])]
-    values = np.concatenate(chunks, axis=1) if chunks else np.empty((width, 0))
-    columns = tuple(
-        ColumnSummary(name, tuple(cells[index] for cells in first), int(np.isfinite(values[index]).sum()))
-        for index, name in enumerate(layout.names)
-    )
-    steps = [np.diff(column) for column in values]
-    increasing = [step for step in steps if step.size and bool(np.all(step > 0.0))]
-    rate = 1.0 / float(np.median(increasing[0])) if increasing else None
-    return CsvSummary(layout.delimiter, columns, values.shape[1], rate)
+    return np.concatenate(chunks, axis=1) if chunks else np.empty((width, 0))
 
 
 def sniff_layout(path: Path, delimiter: str | None = None, decimal: str = ".") -> Layout:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,8 @@ from friction_ocp.quantities import dimension_of, to_si
 MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
 _KEYS = ("format", "time", "channels", *_TEXTS)
-_COLUMN_KEYS = ("column", "unit", "scale")
+_COLUMN_KEYS = ("column", "unit", "scale", "wrap", "reset", "instead_of")
+_CHANNEL_KEYS = (*_COLUMN_KEYS, "time")
 
 
 @dataclass(frozen=True)
@@ -24,16 +26,26 @@ class Column:
 
     column: str | int
     """Its header, or its index from 0."""
-    unit: str
+    unit: str = ""
+    """"" takes the unit that the file states."""
     scale: str | None = None
     """What one count is, such as "2*pi/4096 rad", for unit "counts"."""
+    wrap: float | None = None
+    """How much a counter loses when it starts over, in the numbers of the column."""
+    reset: float | None = None
+    """The value to which a counter is set, in the numbers of the column."""
+    instead_of: str = ""
+    """The unit that the file states, where `unit` is to be taken instead."""
+    time: Column | None = None
+    """The times of this channel alone."""
 
 
 @dataclass(frozen=True)
 class ImportMap:
     """How the columns of a table become the channels of a recording."""
 
-    time: Column
+    time: Column | None
+    """The times of all channels; None takes the time axes that the file itself has."""
     channels: Mapping[str, Column]
     title: str = ""
     source: str = ""
@@ -82,11 +94,9 @@ class _MapReader:
             self.report("delimiter", what, "one character; ' ' is any spaces and tabs", "leave it out to have it found")
         if texts.get("decimal", ".") not in (".", ","):
             self.report("decimal", f"unknown decimal sign '{texts['decimal']}'", "available: '.', ','")
-        time = self.column("time", keys.get("time"))
-        if time is not None and self.dimension("time", time) not in ("time", None):
-            self.report("time", f"unit '{time.unit}' does not measure time", "a unit such as s, ms or us")
+        time = self.time("time", keys["time"]) if "time" in keys else None
         channels = self.channels(keys.get("channels"))
-        if time is None or not channels:
+        if not channels:
             return None
         return ImportMap(time, channels, where=self.where, **cast(dict[str, Any], texts))
 
@@ -98,29 +108,45 @@ class _MapReader:
         for name, entry in (found or {}).items():
             if "/" in name:
                 self.report(f"channels.{name}", "the name has a slash", "text without a slash", "rename it")
-            column = self.column(f"channels.{name}", entry)
+            column = self.column(f"channels.{name}", entry, _CHANNEL_KEYS)
             if column is not None:
                 self.dimension(f"channels.{name}", column)
                 channels[name] = column
         return channels
 
-    def column(self, place: str, content: object) -> Column | None:
-        keys = self.mapping(place, content, _COLUMN_KEYS)
+    def time(self, place: str, content: object) -> Column | None:
+        time = self.column(place, content, _COLUMN_KEYS)
+        if time is not None and self.dimension(place, time) not in ("time", None):
+            self.report(place, f"unit '{time.unit}' does not measure time", "a unit such as s, ms or us")
+        return time
+
+    def column(self, place: str, content: object, known: tuple[str, ...]) -> Column | None:
+        keys = self.mapping(place, content, known)
         if keys is None:
             return None
-        for key in ("column", "unit"):
-            if key not in keys:
-                self.report(place, f"there is no {key}", "{column, unit}")
-        if not {"column", "unit"} <= keys.keys():
+        if "column" not in keys:
+            self.report(place, "there is no column", "{column, unit}")
             return None
         name = keys["column"]
         if isinstance(name, bool) or not isinstance(name, str | int) or name == "" or str(name).startswith("-"):
             self.report(f"{place}.column", f"column is {name!r}", "a header, or an index from 0")
             return None
-        scale = self.text(f"{place}.scale", keys["scale"]) if "scale" in keys else None
-        return Column(name, self.text(f"{place}.unit", keys["unit"]), scale)
+        texts = {key: self.text(f"{place}.{key}", keys[key]) for key in ("unit", "scale", "instead_of") if key in keys}
+        numbers = {key: self.number(f"{place}.{key}", keys[key]) for key in ("wrap", "reset") if key in keys}
+        if numbers.get("wrap") is not None and not cast(float, numbers["wrap"]) > 0.0:
+            self.report(f"{place}.wrap", f"wrap is {keys['wrap']!r}", "a number above 0, such as 65536 or 360")
+        time = self.time(f"{place}.time", keys["time"]) if "time" in keys else None
+        return Column(name, **cast(dict[str, Any], texts | numbers), time=time)
+
+    def number(self, place: str, content: object) -> float | None:
+        if isinstance(content, int | float) and not isinstance(content, bool) and math.isfinite(content):
+            return float(content)
+        self.report(place, f"this is {_kind(content)}", "a number")
+        return None
 
     def dimension(self, place: str, column: Column) -> str | None:
+        if not column.unit and column.scale is None:
+            return None
         try:
             return dimension_of(to_si((), column.unit, f"{self.where}: {place}", scale=column.scale)[1])
         except FrictionOcpError as error:

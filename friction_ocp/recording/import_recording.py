@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.csv import inspect_csv, read_csv
-from friction_ocp.recording.import_map import ImportMap, load_import_map
+from friction_ocp.recording.csv import open_csv
+from friction_ocp.recording.foreign import ForeignFile, Opener
+from friction_ocp.recording.import_map import load_import_map
+from friction_ocp.recording.listing import describe
+from friction_ocp.recording.matlab import open_matlab
+from friction_ocp.recording.matlab_hdf5 import open_hdf5
+from friction_ocp.recording.mdf import open_mdf
+from friction_ocp.recording.parquet import open_parquet
 from friction_ocp.recording.recording import Recording
+from friction_ocp.recording.rosbag import open_rosbag
+from friction_ocp.recording.table import recording_of
+from friction_ocp.recording.tdms import open_tdms
 
-Reader = Callable[[Path, ImportMap], Recording]
-
-READERS: Mapping[str, Reader] = {
-    ".csv": read_csv,
-    ".tsv": read_csv,
-    ".txt": read_csv,
+READERS: Mapping[str, Opener] = {
+    ".csv": open_csv,
+    ".tsv": open_csv,
+    ".txt": open_csv,
+    ".parquet": open_parquet,
+    ".mat": open_matlab,
+    ".h5": open_hdf5,
+    ".hdf5": open_hdf5,
+    ".mf4": open_mdf,
+    ".mdf": open_mdf,
+    ".dat": open_mdf,
+    ".mcap": open_rosbag,
+    ".db3": open_rosbag,
+    ".bag": open_rosbag,
+    ".tdms": open_tdms,
 }
 """Reader by the suffix of the file; a further format is a further line."""
 
@@ -23,21 +41,41 @@ READERS: Mapping[str, Reader] = {
 def import_recording(path: str | Path, map_path: str | Path) -> Recording:
     """Read a foreign file by a map; raises FrictionOcpError for an unknown format and with all that is wrong."""
     path = Path(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        what = f"no reader for '{path.suffix or path.name}'"
-        remedy = "export the data to one of them"
-        raise FrictionOcpError(Finding(str(path), what, f"available: {', '.join(READERS)}", remedy))
-    return reader(path, load_import_map(map_path))
+    opener, import_map = _opener(path), load_import_map(map_path)
+    _refuse_missing(path)
+    with opener(path, import_map) as file:
+        _refuse_nothing(file, path)
+        return recording_of(file, import_map, path)
 
 
 def inspect_file(path: str | Path) -> str:
-    """Return what a foreign file holds, one line a column."""
+    """Return what a foreign file holds, one line a signal with its unit, rate, length and range."""
     path = Path(path)
-    if path.suffix.lower() not in READERS:
+    opener = _opener(path)
+    _refuse_missing(path)
+    with opener(path, None) as file:
+        _refuse_nothing(file, path)
+        return describe(file, path)
+
+
+def _opener(path: Path) -> Opener:
+    if path.is_dir() and (path / "metadata.yaml").is_file():
+        return open_rosbag
+    opener = READERS.get(path.suffix.lower())
+    if opener is None:
         what = f"no reader for '{path.suffix or path.name}'"
-        raise FrictionOcpError(Finding(str(path), what, f"available: {', '.join(READERS)}"))
-    summary = inspect_csv(path)
-    rate = "" if summary.rate is None else f", about {summary.rate:.6g} rows a second if the first column is time in s"
-    lines = [f"{path}: {summary.rows} rows, delimiter {summary.delimiter!r}{rate}"]
-    return "\n".join([*lines, *(str(column) for column in summary.columns)])
+        allowed = f"available: {', '.join(READERS)}, or the folder of a ROS 2 bag"
+        raise FrictionOcpError(Finding(str(path), what, allowed, "export the data to one of them"))
+    return opener
+
+
+def _refuse_missing(path: Path) -> None:
+    if not path.exists():
+        raise FrictionOcpError(Finding(str(path), "there is no such file", remedy="correct the path"))
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        raise FrictionOcpError(Finding(str(path), "this is a folder", "a file, or the folder of a ROS 2 bag"))
+
+
+def _refuse_nothing(file: ForeignFile, path: Path) -> None:
+    if not file.signals:
+        raise FrictionOcpError(Finding(str(path), f"there is no series in it ({file.summary})", "at least one"))

@@ -1,69 +1,215 @@
-"""A table of numbers, and how a map turns it into a recording: what every import format shares."""
+"""How a map turns the signals of a foreign file into a recording: what every import format shares."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.checks import check_recording
+from friction_ocp.recording.counters import unroll
+from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
 
+EXACT_INTEGERS = 2**53
+"""Integers up to here are floats without loss; time in ns since 1970 is beyond it."""
+
 
 @dataclass(frozen=True)
-class Table:
-    """Columns of one file, read only where they are wanted."""
+class _Wanted:
+    """One entry of the map with the signal that it names."""
 
-    names: tuple[str, ...]
-    read: Callable[[Sequence[int]], Mapping[int, FloatArray]]
-    """Column indices -> (n,) each, NaN where a cell is empty; raises FrictionOcpError for what is not a number."""
+    place: str
+    entry: Column
+    index: int
+    signal: Signal
+    unit: str
 
 
-def recording_of(table: Table, import_map: ImportMap, path: Path) -> Recording:
-    """Turn the mapped columns into channels in SI units; raises FrictionOcpError with every finding."""
-    where = str(path)
-    entries = {"time": import_map.time} | {f"channels.{name}": entry for name, entry in import_map.channels.items()}
-    found = {
-        place: _find_column(table.names, entry, f"{import_map.where}: {place}") for place, entry in entries.items()
-    }
-    _raise([index for index in found.values() if isinstance(index, Finding)])
-    indices = {place: index for place, index in found.items() if isinstance(index, int)}
-    columns = table.read(sorted(set(indices.values())))
-    values = {
-        place: to_si(columns[indices[place]], entry.unit, f"{where}: {place}", scale=entry.scale)
-        for place, entry in entries.items()
-    }
-    time, _ = values["time"]
-    with path.open("rb") as file:
-        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+def recording_of(file: ForeignFile, import_map: ImportMap, path: Path) -> Recording:
+    """Turn the mapped signals into channels in SI units; raises FrictionOcpError with every finding."""
+    wanted = _wanted(file, import_map)
+    check_sizes(path, [item.signal for item in wanted.values()])
+    raw = file.read(sorted({item.index for item in wanted.values()}))
+    origin = _far_origin([raw[item.index] for place, item in wanted.items() if _is_time(place)])
+    findings: list[Finding] = []
+    values: dict[str, tuple[FloatArray, str]] = {}
+    for place, item in wanted.items():
+        try:
+            values[place] = _converted(raw[item.index], item, origin if _is_time(place) else 0, path)
+        except FrictionOcpError as error:
+            findings += error.findings
+    _raise(findings)
+    channels = _channels(file, import_map, wanted, values)
+    sha256 = _fingerprint(path)
     recording = Recording(
         name=path.stem,
-        channels={name: Channel(name, time, *values[f"channels.{name}"]) for name in import_map.channels},
+        channels=channels,
         title=import_map.title or path.stem,
         source=import_map.source,
         licence=import_map.licence,
         path=path,
         sha256=sha256,
-        attributes={"imported_from": path.name, "imported_sha256": sha256},
+        attributes={"imported_from": path.name, "imported_sha256": sha256, **_origin(file, origin)},
     )
-    _raise(check_recording(recording, where))
+    _raise(check_recording(recording, str(path)))
     return recording
 
 
-def _find_column(names: Sequence[str], column: Column, where: str) -> int | Finding:
-    """Return the index of a column, or why it cannot be found."""
-    allowed = "columns: " + ", ".join(f"{index} '{name}'" for index, name in enumerate(names))
+def _is_time(place: str) -> bool:
+    return place == "time" or place.endswith(".time")
+
+
+def _wanted(file: ForeignFile, import_map: ImportMap) -> dict[str, _Wanted]:
+    """Return what the map names by its place there; raises FrictionOcpError for what cannot be found or has no unit."""
+    entries = {} if import_map.time is None else {"time": import_map.time}
+    for name, entry in import_map.channels.items():
+        entries[f"channels.{name}"] = entry
+        if entry.time is not None:
+            entries[f"channels.{name}.time"] = entry.time
+    findings: list[Finding] = []
+    wanted: dict[str, _Wanted] = {}
+    for place, entry in entries.items():
+        where = f"{import_map.where}: {place}"
+        index = _find(file.signals, entry, where)
+        if isinstance(index, Finding):
+            findings.append(index)
+            continue
+        signal = file.signals[index]
+        findings += _faults(signal, entry, where)
+        wanted[place] = _Wanted(place, entry, index, signal, entry.unit or signal.unit)
+    findings += _without_time(import_map, wanted)
+    _raise(findings)
+    return wanted
+
+
+def _find(signals: Sequence[Signal], column: Column, where: str) -> int | Finding:
+    """Return the index of a signal, or why it cannot be found."""
+    shown = [f"{index} '{signal.name}'" for index, signal in enumerate(signals)]
+    allowed = "columns: " + ", ".join(shown[:40]) + (f", and {len(shown) - 40} more" if len(shown) > 40 else "")
     if isinstance(column.column, int):
-        found = column.column < len(names)
+        found = column.column < len(signals)
         return column.column if found else Finding(where, f"there is no column {column.column}", allowed)
-    matches = [index for index, name in enumerate(names) if name == column.column.strip()]
+    matches = [index for index, signal in enumerate(signals) if signal.name == column.column.strip()]
     if len(matches) > 1:
         return Finding(where, f"{len(matches)} columns are called '{column.column}'", allowed, "give the index")
     return matches[0] if matches else Finding(where, f"there is no column '{column.column}'", allowed)
+
+
+def _faults(signal: Signal, entry: Column, where: str) -> list[Finding]:
+    if not signal.numeric:
+        return [Finding(where, f"'{signal.name}' holds no numbers", "a column of numbers", "name another one")]
+    if not entry.unit and not signal.unit:
+        return [Finding(where, f"there is no unit, and the file states none for '{signal.name}'", "{column, unit}")]
+    if entry.unit and signal.unit and entry.instead_of != signal.unit and not _same(entry, signal.unit):
+        what = f"the unit is '{entry.unit}', but the file says '{signal.unit}' of '{signal.name}'"
+        remedy = f"leave the unit out, or confirm it with instead_of: {signal.unit}"
+        return [Finding(where, what, "the unit of the file", remedy)]
+    return []
+
+
+def _same(entry: Column, stated: str) -> bool:
+    """Whether the unit of the map is that of the file in another spelling; counts know no other unit."""
+    if entry.scale is not None:
+        return stated in ("count", "counts", "1", "-")
+    try:
+        (mine, kind), (theirs, other) = (to_si((1.0, 2.0), unit) for unit in (entry.unit, stated))
+    except FrictionOcpError:
+        return False
+    return kind == other and bool(np.array_equal(mine, theirs))
+
+
+def _without_time(import_map: ImportMap, wanted: Mapping[str, _Wanted]) -> list[Finding]:
+    if import_map.time is not None:
+        return []
+    lost = [
+        (name, item)
+        for name, entry in import_map.channels.items()
+        if entry.time is None
+        and (item := wanted.get(f"channels.{name}")) is not None
+        and item.signal.numeric
+        and not item.signal.clock
+    ]
+    remedy = "name the column of the times, time: {column, unit}"
+    return [
+        Finding(f"{import_map.where}: channels.{name}", f"the file gives '{item.signal.name}' no times", "", remedy)
+        for name, item in lost
+    ]
+
+
+def _far_origin(times: Sequence[Values]) -> int:
+    """Return the integer to count times from where they are too large for floats, such as ns since 1970; else 0."""
+    far = [int(time[0]) for time in times if time.dtype.kind in "iu" and time.size and int(time[0]) > EXACT_INTEGERS]
+    return min(far, default=0)
+
+
+def _converted(raw: Values, item: _Wanted, origin: int, path: Path) -> tuple[FloatArray, str]:
+    """Return values in SI, counters unrolled."""
+    where = f"{path}: {item.place}"
+    if not is_real(raw):
+        raise FrictionOcpError(Finding(where, f"'{item.signal.name}' holds no real numbers but {raw.dtype}"))
+    shifted = raw - raw.dtype.type(origin) if origin and raw.dtype.kind in "iu" else raw
+    values = unroll(np.asarray(shifted, dtype=np.float64), item.entry.wrap, item.entry.reset, where)
+    converted, unit = to_si(values, item.unit, where, scale=item.entry.scale)
+    if _is_time(item.place) and unit != "s":
+        raise FrictionOcpError(Finding(where, f"'{item.signal.name}' is in {item.unit}", "a unit such as s, ms or us"))
+    return converted, unit
+
+
+def _channels(
+    file: ForeignFile,
+    import_map: ImportMap,
+    wanted: Mapping[str, _Wanted],
+    values: Mapping[str, tuple[FloatArray, str]],
+) -> dict[str, Channel]:
+    """Give every channel its values and its time axis; equal axes are one clock, the first of them `time`."""
+    axes: dict[str, FloatArray] = {}
+    if import_map.time is not None and any(entry.time is None for entry in import_map.channels.values()):
+        axes["time"] = values["time"][0]
+    channels: dict[str, Channel] = {}
+    for name, entry in import_map.channels.items():
+        signal = wanted[f"channels.{name}"].signal
+        if entry.time is not None:
+            label, time = wanted[f"channels.{name}.time"].signal.name, values[f"channels.{name}.time"][0]
+        elif import_map.time is not None:
+            label, time = "time", values["time"][0]
+        else:
+            label, time = signal.clock, file.clock(signal.clock)
+        clock = next((known for known, axis in axes.items() if np.array_equal(axis, time)), None)
+        if clock is None:
+            clock = _clock_name(label, axes) if axes else "time"
+            axes[clock] = time
+        channels[name] = Channel(name, axes[clock], *values[f"channels.{name}"], clock=clock)
+    return channels
+
+
+def _clock_name(label: str, taken: Mapping[str, FloatArray]) -> str:
+    """Return a name for a time axis that fits into an HDF5 path and is not taken."""
+    plain = re.sub(r"[^\w.-]+", "_", label).strip("_.") or "clock"
+    names = (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3)))
+    return next(name for name in names if name not in taken)
+
+
+def _origin(file: ForeignFile, origin: int) -> dict[str, str]:
+    """Return from when the times count, where they have been shifted."""
+    text = str(origin) if origin else file.origin
+    return {"time_origin": text} if text else {}
+
+
+def _fingerprint(path: Path) -> str:
+    """Return the SHA-256 of a file, or of all files of a folder in the order of their names."""
+    if path.is_file():
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    digests = [f"{item.name} {_fingerprint(item)}" for item in sorted(path.iterdir()) if item.is_file()]
+    return hashlib.sha256("\n".join(digests).encode()).hexdigest()
 
 
 def _raise(findings: list[Finding]) -> None:

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.recording.csv import inspect_csv, read_csv, sniff_layout
+from friction_ocp.recording.csv import open_csv, read_csv, sniff_layout
 from friction_ocp.recording.hdf5 import read_recording, write_recording
 from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
 from friction_ocp.recording.import_recording import import_recording
+from friction_ocp.recording.listing import list_signals
 
 MAP = """
 format: friction-ocp-map/1
@@ -179,8 +180,8 @@ def map_of(**changes: str) -> str:
             {"chanels": "{}"},
             "unknown key 'chanels'; available: format, time, channels, title, source, licence, delimiter",
         ),
-        ({"time": "-"}, "time: there is nothing; a mapping of column, unit, scale"),
-        ({"time": "{column: t}"}, "time: there is no unit; {column, unit}"),
+        ({"time": "~"}, "time: there is nothing; a mapping of column, unit, scale"),
+        ({"time": "{unit: s}"}, "time: there is no column; {column, unit}"),
         ({"time": "{column: t, unit: deg}"}, "time: unit 'deg' does not measure time; a unit such as s, ms or us"),
         ({"time": "{column: -1, unit: s}"}, "time.column: column is -1; a header, or an index from 0"),
         ({"time": "{column: true, unit: s}"}, "time.column: column is True; a header"),
@@ -193,6 +194,9 @@ def map_of(**changes: str) -> str:
             {"channels": "{x: {column: x, unit: A, gain: 2}}"},
             "channels.x: unknown key 'gain'; available: column, unit, scale",
         ),
+        ({"channels": "{x: {column: x, unit: A, wrap: 0}}"}, "channels.x.wrap: wrap is 0; a number above 0"),
+        ({"channels": "{x: {column: x, unit: A, wrap: .nan}}"}, "channels.x.wrap: this is nan; a number"),
+        ({"channels": "{x: {column: x, unit: A, time: {column: t, unit: A}}}"}, "channels.x.time: unit 'A' does not"),
         ({"channels": "{a/b: {column: x, unit: A}}"}, "channels.a/b: the name has a slash"),
         ({"decimal": "'#'"}, "decimal: unknown decimal sign '#'; available: '.', ','"),
         ({"delimiter": "'ab'"}, "delimiter: the delimiter is 'ab'; one character"),
@@ -215,9 +219,23 @@ def test_all_faults_of_a_map_are_told_at_once(tmp_path: Path) -> None:
     assert len(caught.value.findings) == 5
 
 
+def test_what_the_file_has_to_say_is_asked_for(tmp_path: Path) -> None:
+    """A map may leave times and units to the file; one that states neither is told so."""
+    content = put(tmp_path / "a.csv", "t,x,y [mA]\n0,1,1000\n1,2,2000\n")
+    with pytest.raises(FrictionOcpError) as caught:
+        import_recording(content, put(tmp_path / "m.yaml", map_of(time="-", channels="{x: {column: x}}")))
+    assert [str(item).partition("m.yaml: ")[2] for item in caught.value.findings] == [
+        "channels.x: there is no unit, and the file states none for 'x'; {column, unit}",
+        "channels.x: the file gives 'x' no times; name the column of the times, time: {column, unit}",
+    ]
+    in_header = "{y: {column: 'y [mA]', time: {column: t, unit: s}}}"
+    recording = import_recording(content, put(tmp_path / "m.yaml", map_of(time="-", channels=in_header)))
+    assert (recording.channels["y"].values.tolist(), recording.channels["y"].unit) == ([1.0, 2.0], "A")
+
+
 def test_other_formats_and_missing_files_are_told(tmp_path: Path) -> None:
     """An unknown suffix lists the formats; a missing file or map is told as such."""
-    with pytest.raises(FrictionOcpError, match=r"a.xlsx: no reader for '.xlsx'; available: .csv, .tsv, .txt; export"):
+    with pytest.raises(FrictionOcpError, match=r"a.xlsx: no reader for '.xlsx'; available: .csv, .tsv, .txt, .parquet"):
         import_recording(tmp_path / "a.xlsx", tmp_path / "m.yaml")
     with pytest.raises(FrictionOcpError, match=r"m.yaml: there is no such map"):
         import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
@@ -232,15 +250,16 @@ def test_map_refuses_python_objects(tmp_path: Path) -> None:
         load_import_map(put(tmp_path / "m.yaml", content))
 
 
-def test_inspection_lists_columns_rows_and_rate(tmp_path: Path) -> None:
-    """Whoever writes a map sees names, examples, how many numbers there are, and the rate."""
-    path = put(tmp_path / "a.csv", "state;t;x\non;0;5\non;0.01;\noff;0.02;7\noff;0.03;8\n")
-    summary = inspect_csv(path)
-    assert (summary.delimiter, summary.rows) == (";", 4)
-    assert summary.rate == pytest.approx(100.0)
-    assert [column.name for column in summary.columns] == ["state", "t", "x"]
-    assert summary.columns[2].examples == ("5", "", "7")
-    assert [column.numbers for column in summary.columns] == [0, 4, 3]
+def test_inspection_lists_columns_with_rate_and_range(tmp_path: Path) -> None:
+    """Whoever writes a map sees names, units in headers, ranges, the rate, and which columns hold no numbers."""
+    path = put(tmp_path / "a.csv", "state;t;x [deg]\non;0;5\non;0.01;\noff;0.02;7\noff;0.03;8\n")
+    with open_csv(path) as file:
+        state, t, x = list_signals(file, path)
+    assert file.summary == "delimiter ';'"
+    assert [item.signal.name for item in (state, t, x)] == ["state", "t", "x [deg]"]
+    assert (state.signal.numeric, t.signal.samples, x.signal.unit) == (False, 4, "deg")
+    assert x.rate == pytest.approx(100.0)
+    assert (x.seconds, x.low, x.high) == (pytest.approx(0.03), 5.0, 8.0)
 
 
 def test_columns_without_header_are_numbered(tmp_path: Path) -> None:

@@ -1,0 +1,97 @@
+"""HDF5 files of other programs, those of MATLAB 7.3 among them: the datasets of numbers in all groups."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py as _h5py  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording.foreign import ForeignFile, Signal, Values, no_clock, opened, reading
+from friction_ocp.recording.import_map import ImportMap
+
+h5py: Any = _h5py  # its own types are incomplete
+
+KIND = "an HDF5 file"
+MAX_DEPTH = 20
+MAX_COLUMNS = 200
+"""Columns of a matrix that are listed; images have more and are left out."""
+_UNIT_KEYS = ("unit", "units", "Unit", "Units")
+
+
+@dataclass(frozen=True)
+class _Series:
+    """One series of values: a vector, or a row or column of a matrix."""
+
+    signal: Signal
+    path: str
+    where: tuple[Any, ...]
+    """What of the dataset it is."""
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5, as MATLAB writes since version 7.3."""
+    return bool(h5py.is_hdf5(path))
+
+
+@contextmanager
+def open_hdf5(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
+    """List the datasets of numbers by their paths, `group.name`; nothing outside the file is opened."""
+    with opened(path, KIND, lambda: h5py.File(path, "r")) as file:
+        series = tuple(item for item in _walk(file, "", 0))
+
+        def read(wanted: Sequence[int]) -> Mapping[int, Values]:
+            with reading(path, KIND):
+                return {k: _values(file, series[k], path) for k in wanted}
+
+        summary = "HDF5, MATLAB 7.3" if path.suffix.lower() == ".mat" else "HDF5"
+        yield ForeignFile(tuple(item.signal for item in series), read, no_clock, summary)
+
+
+def _walk(group: Any, prefix: str, depth: int) -> Iterator[_Series]:
+    """Yield every series below a group; links out of the file and references of MATLAB are left out."""
+    for key in group:
+        link = group.get(key, getlink=True)
+        if not isinstance(link, h5py.HardLink) or key.startswith("#"):
+            continue
+        node, name = group[key], f"{prefix}{key}"
+        if isinstance(node, h5py.Group) and depth < MAX_DEPTH:
+            yield from _walk(node, f"{name}.", depth + 1)
+        elif isinstance(node, h5py.Dataset):
+            yield from _series(node, name)
+
+
+def _series(node: Any, name: str) -> Iterator[_Series]:
+    """Yield a vector as it is and a matrix along its longer side."""
+    shape: tuple[int, ...] = tuple(node.shape or ())
+    longer = int(np.argmax(shape)) if shape else 0
+    if len([size for size in shape if size > 1]) <= 1:
+        where: tuple[Any, ...] = tuple(slice(None) if axis == longer else 0 for axis in range(len(shape)))
+        yield _Series(_signal(node, name, max(shape, default=1)), node.name, where)
+        return
+    if len(shape) != 2 or min(shape) > MAX_COLUMNS:
+        return
+    for k in range(min(shape)):
+        where = (slice(None), k) if longer == 0 else (k, slice(None))
+        yield _Series(_signal(node, f"{name}[{k}]", max(shape)), node.name, where)
+
+
+def _signal(node: Any, name: str, samples: int) -> Signal:
+    stated = next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), "")
+    unit = stated.decode(errors="replace") if isinstance(stated, bytes) else str(stated)
+    matlab_class = node.attrs.get("MATLAB_class", b"")
+    text = matlab_class in (b"char", "char") or node.attrs.get("MATLAB_empty", 0)
+    return Signal(name, samples, unit, numeric=node.dtype.kind in "biuf" and not text)
+
+
+def _values(file: Any, series: _Series, path: Path) -> Values:
+    node = file[series.path]
+    if node.is_virtual or node.external:
+        what = f"'{series.signal.name}' keeps its data in other files"
+        raise FrictionOcpError(Finding(str(path), what, "data inside the file", "copy it there"))
+    return np.atleast_1d(np.asarray(node[series.where] if series.where else node[()]))

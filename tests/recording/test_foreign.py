@@ -1,0 +1,216 @@
+"""Import of the formats of other programs, from files that their own libraries wrote."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+from foreign_files import CASES, START_NS, ForeignCase, angle, current, fast, slow
+
+from friction_ocp.cli import DONE, WRONG_INPUT, main
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.recording import foreign
+from friction_ocp.recording.foreign import MAX_SAMPLES, Signal, check_sizes
+from friction_ocp.recording.hdf5 import read_recording
+from friction_ocp.recording.import_recording import READERS, import_recording, inspect_file
+
+ROUNDING = 1e-12
+NANOSECOND = 1.1e-9
+"""Times in files of ns since 1970 are kept to the ns."""
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_run_comes_back_as_it_was(tmp_path: Path, name: str) -> None:
+    """Values are those that were written, in SI, each channel on its own time axis, in the file that is written too."""
+    case = CASES[name]
+    source = case.write(tmp_path)
+    arguments = ["import", str(source), "--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+    assert main(arguments) == DONE
+    recording = read_recording(tmp_path / "out.h5")
+    seen = recording.channels["angle"]
+    np.testing.assert_allclose(seen.values, np.deg2rad(angle()), rtol=ROUNDING, atol=ROUNDING)
+    np.testing.assert_allclose(seen.time - seen.time[0], fast(), atol=NANOSECOND)
+    assert (seen.unit, seen.clock) == ("rad", "time")
+    if "current" in recording.channels:
+        also = recording.channels["current"]
+        np.testing.assert_allclose(also.values, 1e-3 * current(), rtol=ROUNDING, atol=ROUNDING)
+        np.testing.assert_allclose(also.time - seen.time[0], slow(), atol=NANOSECOND)
+        assert (also.unit, also.clock != "time") == ("A", True)
+    assert len(recording.attributes["imported_sha256"]) == 64
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_inspection_tells_name_unit_rate_and_length(tmp_path: Path, name: str) -> None:
+    """`--inspect` names every column of the map, with its unit where the file has it, its rate and its length."""
+    case = CASES[name]
+    rows = inspect_file(case.write(tmp_path)).splitlines()
+    for entry in case.channels.values():
+        row = next(row for row in rows if f"  {entry['column']}  " in row).split()
+        assert ("deg" in row or "mA" in row) == case.units_in_file
+        assert {"400", "100"} & set(row)
+        assert {"200", "50"} & set(row) or name.startswith("matlab")
+
+
+def test_dates_count_from_the_first(tmp_path: Path) -> None:
+    """Times of a bag, of a column of dates and of integers since 1970 begin near 0, and the file says when that was."""
+    recordings = []
+    for name in ("parquet", "parquet counts", "ros mcap"):
+        folder = tmp_path / name.replace(" ", "_")
+        folder.mkdir()
+        recordings.append(import_recording(CASES[name].write(folder), CASES[name].map(folder)))
+    assert all(item.channels["angle"].time[0] == 0.0 for item in recordings)
+    origins = [item.attributes["time_origin"] for item in recordings]
+    assert origins == ["2023-11-14T22:13:20.123456789Z", str(START_NS), "2023-11-14T22:13:20.123456789Z"]
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "extra"),
+    [
+        ("parquet", "pyarrow", "parquet"),
+        ("mdf", "asammdf", "mdf"),
+        ("tdms", "nptdms", "tdms"),
+        ("ros mcap", "rosbags.highlevel", "ros"),
+    ],
+)
+def test_a_missing_library_is_said_with_its_install_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, module: str, extra: str
+) -> None:
+    """Without the optional package the file is not read, and the command that installs it is given."""
+    source = CASES[name].write(tmp_path)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(FrictionOcpError, match=rf"is not installed; pip install 'friction-ocp\[{extra}\]'"):
+        inspect_file(source)
+
+
+def test_every_extra_that_is_named_exists() -> None:
+    """The install commands name extras of this project; `formats` has all of them."""
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    assert extras["formats"] == ["friction-ocp[parquet,mdf,ros,tdms]"]
+    assert all(len(extras[name]) == 1 for name in ("parquet", "mdf", "ros", "tdms"))
+
+
+def refusal(case: ForeignCase, folder: Path, **changes: Any) -> str:
+    """Return the findings about a run under a map whose channel `angle` is changed."""
+    changed = {**case.channels, "angle": {**case.channels["angle"], **changes}}
+    with pytest.raises(FrictionOcpError) as caught:
+        import_recording(case.write(folder), ForeignCase(case.write, changed, case.time).map(folder))
+    return str(caught.value)
+
+
+def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
+    """A unit that is not that of the file is taken only where the map says that it replaces it."""
+    case = CASES["mdf"]
+    said = refusal(case, tmp_path, unit="rad")
+    assert "channels.angle: the unit is 'rad', but the file says 'deg' of 'angle'" in said
+    assert "leave the unit out, or confirm it with instead_of: deg" in said
+    assert "furlong" in refusal(case, tmp_path, unit="furlong")
+    for unit, expected in (("degree", np.deg2rad(angle())), ("rad", angle())):
+        entry = {"column": "angle", "unit": unit} | ({"instead_of": "deg"} if unit == "rad" else {})
+        recording = import_recording(case.write(tmp_path), ForeignCase(case.write, {"angle": entry}).map(tmp_path))
+        np.testing.assert_allclose(recording.channels["angle"].values, expected, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("unit", ["", "U/min", "-"])
+def test_units_that_cannot_be_read_are_refused(tmp_path: Path, unit: str) -> None:
+    """A unit of the file that no exact conversion is known for is not guessed."""
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append([Signal(angle(), fast(), name="angle", unit=unit)])
+        file.save(tmp_path / "run.mf4")
+    said = refusal(ForeignCase(lambda folder: folder / "run.mf4", {"angle": {"column": "angle"}}), tmp_path)
+    assert f"unknown unit '{unit}'" in said or "the file states none for 'angle'" in said
+
+
+def test_samples_that_a_logger_marks_invalid_are_missing(tmp_path: Path) -> None:
+    """Invalidation bits of MDF become NaN."""
+    from asammdf import MDF, Signal
+
+    bits = fast() > 1.0
+    with MDF(version="4.10") as file:
+        file.append([Signal(angle(), fast(), name="angle", unit="deg", invalidation_bits=bits)])
+        file.save(tmp_path / "run.mf4")
+    case = ForeignCase(lambda folder: folder / "run.mf4", {"angle": {"column": "angle"}})
+    values = import_recording(tmp_path / "run.mf4", case.map(tmp_path)).channels["angle"].values
+    np.testing.assert_array_equal(np.isnan(values), bits)
+
+
+@pytest.mark.parametrize("turn", [360.0, 65536.0])
+def test_wraps_are_unrolled(tmp_path: Path, turn: float) -> None:
+    """A counter that starts over is a straight motion again, past missing samples, and is found by --inspect."""
+    true = turn * 0.07 * np.arange(200.0)
+    shown = np.where(np.arange(200) % 50 == 49, np.nan, true % turn)
+    cells = ["" if np.isnan(value) else f"{value!r}" for value in shown.tolist()]
+    (tmp_path / "run.csv").write_text("t,n\n" + "".join(f"{k * 0.01:.2f},{cell}\n" for k, cell in enumerate(cells)))
+    assert f"starts over: wrap: {turn:g}?" in inspect_file(tmp_path / "run.csv")
+    entry = {"column": "n", "unit": "counts", "scale": "1 deg", "wrap": turn}
+    case = ForeignCase(lambda folder: folder / "run.csv", {"angle": entry}, {"column": "t", "unit": "s"})
+    values = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["angle"].values
+    np.testing.assert_allclose(values, np.deg2rad(np.where(np.isnan(shown), np.nan, true)), rtol=1e-9, atol=1e-9)
+    assert f"near half of wrap = {0.15 * turn:.6g}; steps of" in refusal(case, tmp_path, wrap=0.15 * turn)
+
+
+def test_clocks_that_start_over_go_on(tmp_path: Path) -> None:
+    """A counter of us that wraps at 2^32, and one that a restart sets to 0, give times that only grow."""
+    steps = 10_000 * np.arange(100)
+    wrapped = (2**32 - 500_000 + steps) % 2**32
+    restarted = np.where(np.arange(100) < 60, 7_000_000 + steps, steps - steps[60])
+    rows = "".join(f"{a},{b},{k}\n" for k, (a, b) in enumerate(zip(wrapped, restarted, strict=True)))
+    (tmp_path / "run.csv").write_text("a,b,x\n" + rows)
+    for column, repair in (("a", {"wrap": 2**32}), ("b", {"reset": 0})):
+        time = {"column": column, "unit": "us", **repair}
+        case = ForeignCase(lambda folder: folder / "run.csv", {"x": {"column": "x", "unit": "A"}}, time)
+        found = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["x"].time
+        np.testing.assert_allclose(np.diff(found), 0.01, rtol=1e-9)
+
+
+def test_a_reset_counter_goes_on_at_its_speed(tmp_path: Path) -> None:
+    """An encoder that its index sets to zero is unrolled with the step that it had."""
+    true = 40.0 * np.arange(100.0) + 5000.0
+    shown = np.where(np.arange(100) < 30, true, true - true[30])
+    (tmp_path / "run.csv").write_text("t,n\n" + "".join(f"{k},{value}\n" for k, value in enumerate(shown)))
+    entry = {"column": "n", "unit": "counts", "scale": "1 rad", "reset": 0}
+    case = ForeignCase(lambda folder: folder / "run.csv", {"n": entry}, {"column": "t", "unit": "s"})
+    np.testing.assert_allclose(import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["n"].values, true)
+
+
+def test_sizes_are_refused_before_anything_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Declared lengths are held against the limit and the free memory; the file is not touched for it."""
+    with pytest.raises(FrictionOcpError, match=r"'x' declares 100000000 samples; at most 50000000; split or thin"):
+        check_sizes(tmp_path / "a.mf4", [Signal("x", 100_000_000)])
+    monkeypatch.setattr(foreign, "free_memory", lambda: 10**6)
+    with pytest.raises(FrictionOcpError, match=r"about 1.6 GB of memory are needed, 0.001 GB are free"):
+        check_sizes(tmp_path / "a.mf4", [Signal("x", MAX_SAMPLES)])
+    with h5py.File(tmp_path / "big.h5", "w") as file:
+        file.create_dataset("t", shape=(10**8,), dtype=np.float64, chunks=(1000,))
+    content = {"format": "friction-ocp-map/1", "channels": {"x": {"column": "t", "unit": "A"}}}
+    content["time"] = {"column": "t", "unit": "s"}
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(FrictionOcpError, match="'t' declares 100000000 samples"):
+        import_recording(tmp_path / "big.h5", tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix in READERS if suffix not in (".csv", ".tsv", ".txt")])
+def test_damaged_files_are_findings(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing, noise and a beginning without its end are told as one finding each, without a traceback."""
+    noise = np.random.default_rng(5).bytes(4000)
+    for content in (b"", noise, b"MDF     4.10    " + noise, b"PAR1" + noise + b"PAR1", b"\x89MCAP0\r\n" + noise):
+        (tmp_path / f"run{suffix}").write_bytes(content)
+        assert main(["import", str(tmp_path / f"run{suffix}"), "--inspect"]) == WRONG_INPUT
+        said = capsys.readouterr()
+        assert said.err.startswith(str(tmp_path)) and "Traceback" not in said.err + said.out
+
+
+def test_libraries_are_loaded_only_for_their_formats() -> None:
+    """The optional packages are not needed to import this package's readers."""
+    names = ("parquet", "mdf", "tdms", "rosbag", "matlab")
+    modules = [importlib.import_module(f"friction_ocp.recording.{name}") for name in names]
+    assert not any(hasattr(module, name) for module in modules for name in ("pyarrow", "asammdf", "nptdms", "rosbags"))
