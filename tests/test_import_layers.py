@@ -22,9 +22,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("estimation", "effects"),
     ("statistics",),
     ("diagnosis", "problem_file", "plots", "result_document", "progress_bar"),
-    ("report", "statistics_document", "diagnosis_document"),
-    ("result_folder",),
-    ("diagnosis_folder",),
+    ("report", "statistics_document", "diagnosis_document", "fleet"),
+    ("result_folder", "fleet_document"),
+    ("diagnosis_folder", "fleet_folder"),
     ("cli",),
     ("__init__", "__main__"),
 )
@@ -43,6 +43,8 @@ CONFINED: dict[str, tuple[str, ...]] = {
     "markupsafe": ("report/",),
     "rich": ("progress_bar.py",),
     "argparse": ("cli/",),
+    "distributed": ("execution/cluster.py",),
+    "sqlite3": ("fleet/store.py",),
     "pint": ("quantities.py",),
 }
 """Libraries, and the files or folders that may import them."""

@@ -14,6 +14,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 
 if TYPE_CHECKING:
     from friction_ocp.estimation.problem import Problem
+    from friction_ocp.execution.executor import AbstractExecutor
 
 DONE, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 1, 2, 3
 
@@ -33,6 +34,28 @@ def add_job(commands: Any, name: str, text: str, run: Callable[[argparse.Namespa
     job.add_argument("--out", type=Path, help="output folder; default results/<problem stem>-" + name)
     job.add_argument("--json", action="store_true", help="result.json on standard output")
     job.set_defaults(run=run)
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where tasks run."""
+    text = "processes on this machine; default 2; 1 is this one"
+    parser.add_argument("--workers", "--jobs", type=positive, default=2, metavar="N", help=text)
+    parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="Dask scheduler whose workers do the work")
+
+
+def executor(options: argparse.Namespace) -> AbstractExecutor:
+    """Return where tasks run."""
+    from friction_ocp.execution.executor import executor_of
+
+    return executor_of(options.workers, options.scheduler)
+
+
+def positive(text: str) -> int:
+    """Return a count that an option states."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is not positive")
+    return number
 
 
 def output_folder(options: argparse.Namespace) -> Path:

@@ -9,7 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from friction_ocp.cli.options import DONE, NOT_CONVERGED, add_job, checked, output_folder, show
+from friction_ocp.cli.options import (
+    DONE,
+    NOT_CONVERGED,
+    add_job,
+    add_workers,
+    checked,
+    executor,
+    output_folder,
+    positive,
+    show,
+)
 from friction_ocp.errors import Finding, FrictionOcpError
 
 if TYPE_CHECKING:
@@ -30,23 +40,16 @@ def add_commands(commands: Any) -> None:
     comparing.add_argument("--json", action="store_true", help="result.json on standard output")
     comparing.set_defaults(run=_compare)
     parsers = commands.choices
-    parsers["multistart"].add_argument("--starts", type=_positive, help="starts, the guess among them; default 20")
+    parsers["multistart"].add_argument("--starts", type=positive, help="starts, the guess among them; default 20")
     parsers["profile"].add_argument(
         "--parameter", action="append", default=[], help="profile this one only; repeatable"
     )
-    parsers["bootstrap"].add_argument("--draws", type=_positive, default=200, help="draws; default 200")
+    parsers["bootstrap"].add_argument("--draws", type=positive, default=200, help="draws; default 200")
     comparing.add_argument(
         "--nested", action="append", default=[], metavar="SPECIAL:GENERAL", help="state that a model is a special case"
     )
     for name in ("multistart", "profile", "bootstrap", "compare"):
-        parsers[name].add_argument("--workers", type=_positive, default=2, help="processes; default 2; 1 is this one")
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{number} is not positive")
-    return number
+        add_workers(parsers[name])
 
 
 def _multistart(options: argparse.Namespace) -> int:
@@ -93,7 +96,7 @@ def _work(options: argparse.Namespace, make: Make) -> int:
 
     folder = output_folder(options)
     try:
-        with _execution(folder, options.workers) as execution:
+        with _execution(folder, options) as execution:
             statistic = make(execution)
     except KeyboardInterrupt:
         if (folder / "tasks").exists():
@@ -107,13 +110,12 @@ def _work(options: argparse.Namespace, make: Make) -> int:
 
 
 @contextmanager
-def _execution(folder: Path, workers: int) -> Generator[Execution]:
-    from friction_ocp.execution.executor import local_executor
+def _execution(folder: Path, options: argparse.Namespace) -> Generator[Execution]:
     from friction_ocp.progress_bar import progress_bar, task_bar
     from friction_ocp.statistics.execution import Execution
 
     with progress_bar() as progress, task_bar() as watch:
-        yield Execution(local_executor(workers), folder, progress, watch)
+        yield Execution(executor(options), folder, progress, watch)
 
 
 def _status(options: argparse.Namespace, statistic: Statistic) -> int:

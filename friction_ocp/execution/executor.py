@@ -1,4 +1,4 @@
-"""Where tasks run: one interface, in front of this process, of others, and some day of a cluster."""
+"""Where tasks run: one interface, in front of this process, of others, and of a cluster."""
 
 from __future__ import annotations
 
@@ -28,8 +28,12 @@ class InProcess(AbstractExecutor):
             yield attempt(task, shared)
 
 
-def local_executor(workers: int = 2) -> AbstractExecutor:
-    """Return what runs tasks on this machine; one worker is this process."""
+def executor_of(workers: int = 2, scheduler: str = "") -> AbstractExecutor:
+    """Return what runs tasks: the workers of a Dask scheduler, else processes of this machine; one is this process."""
+    if scheduler:
+        from friction_ocp.execution.cluster import Cluster
+
+        return Cluster(scheduler)
     from friction_ocp.execution.processes import Processes
 
     return Processes(workers) if workers > 1 else InProcess()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -16,8 +17,20 @@ FORMAT = "friction-ocp-task/1"
 """{format, key, fingerprint, seconds} with `value`, or with `error` and `trace`."""
 
 
+class AbstractLedger(ABC):
+    """Where outcomes outlive a run."""
+
+    @abstractmethod
+    def find(self, task: Task, shared_fingerprint: str) -> Outcome | None:
+        """Return the outcome of a task from an earlier run; None where there is none, or none that can be read."""
+
+    @abstractmethod
+    def keep(self, task: Task, shared_fingerprint: str, outcome: Outcome) -> None:
+        """Write an outcome; not that of a lost task, which the next run tries again."""
+
+
 @dataclass(frozen=True)
-class Ledger:
+class Ledger(AbstractLedger):
     """Outcomes in a folder; without one nothing is kept.
 
     A file is named after its task and the fingerprint of everything that decides its value: the shared argument, the
@@ -27,7 +40,6 @@ class Ledger:
     folder: Path | None = None
 
     def find(self, task: Task, shared_fingerprint: str) -> Outcome | None:
-        """Return the outcome of a task from an earlier run; None where there is none, or none that can be read."""
         path = self._path(task, shared_fingerprint)
         if path is None:
             return None
@@ -40,7 +52,6 @@ class Ledger:
         return _outcome(task, cast("dict[str, Any]", content))
 
     def keep(self, task: Task, shared_fingerprint: str, outcome: Outcome) -> None:
-        """Write an outcome; not that of a lost task, which the next run tries again."""
         path = self._path(task, shared_fingerprint)
         if path is None or outcome.lost:
             return

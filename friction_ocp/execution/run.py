@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from friction_ocp.execution.executor import AbstractExecutor
-from friction_ocp.execution.ledger import Ledger
+from friction_ocp.execution.ledger import AbstractLedger, Ledger
 from friction_ocp.execution.task import Outcome, Task
 
 
@@ -40,7 +40,7 @@ def run_tasks(
     shared: Any,
     shared_fingerprint: str,
     executor: AbstractExecutor,
-    ledger: Ledger = Ledger(),
+    ledger: AbstractLedger = Ledger(),
     watch: Watch = unwatched,
 ) -> Mapping[str, Outcome]:
     """Return the outcome of every task by its key, in the order of the tasks.

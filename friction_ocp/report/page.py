@@ -73,8 +73,8 @@ def render_report(result: Json, series: Series) -> str:
             "friction_json": embedded_json(friction),
             "residuals": objects(result, "residuals"),
             "correlation": correlation_rows(part(result, "correlation")),
-            "solver": _facts(solver),
-            "provenance": _facts(provenance),
+            "solver": facts(solver),
+            "provenance": facts(provenance),
             "checksums": checksums,
         },
     )
@@ -127,8 +127,9 @@ def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
     ]
 
 
-def _facts(facts: Json) -> dict[str, str]:
-    return {str(key).replace("_", " "): _fact(value) for key, value in facts.items()}
+def facts(found: Json) -> dict[str, str]:
+    """Return names and values as a person reads them."""
+    return {str(key).replace("_", " "): _fact(value) for key, value in found.items()}
 
 
 def _fact(value: Any) -> str:

@@ -15,12 +15,17 @@ from pathlib import Path
 
 import engine
 import servo
+import users
 import yaml
 from checks import Check, print_check, status
 
 LINES = Path(__file__).with_name("done_when.yaml")
 Measure = Callable[[str, bool], Check]
-MEASURES: Mapping[str, Mapping[str, Measure]] = {"servo": servo.MEASURES, "engine": engine.MEASURES}
+MEASURES: Mapping[str, Mapping[str, Measure]] = {
+    "servo": servo.MEASURES,
+    "engine": engine.MEASURES,
+    "users": users.MEASURES,
+}
 """By piece of work and ID: (line, quick) -> check."""
 
 

@@ -15,7 +15,7 @@ import pytest
 from chores import dying, environment, failing, noted, slowly_noted
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.execution.executor import AbstractExecutor, InProcess, local_executor
+from friction_ocp.execution.executor import AbstractExecutor, InProcess, executor_of
 from friction_ocp.execution.ledger import Ledger
 from friction_ocp.execution.processes import Processes
 from friction_ocp.execution.run import Tally, run_tasks
@@ -121,8 +121,8 @@ def test_workers_do_not_share_out_processors_again(tmp_path: Path) -> None:
 
 def test_one_worker_is_this_process() -> None:
     """For a debugger."""
-    assert isinstance(local_executor(1), InProcess)
-    assert local_executor(3) == Processes(3)
+    assert isinstance(executor_of(1), InProcess)
+    assert executor_of(3) == Processes(3)
 
 
 def test_findings_keep_their_text(tmp_path: Path) -> None:
