@@ -22,7 +22,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("estimation", "effects"),
     ("statistics",),
     ("diagnosis", "problem_file", "plots", "result_document", "progress_bar"),
-    ("report", "statistics_document", "diagnosis_document", "fleet"),
+    ("report", "statistics_document", "diagnosis_document", "fleet", "export"),
     ("result_folder", "fleet_document"),
     ("diagnosis_folder", "fleet_folder"),
     ("cli",),

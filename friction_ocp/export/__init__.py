@@ -1,0 +1,1 @@
+"""Fitted drives in the formats of other programs, what those cannot express, and what that costs."""

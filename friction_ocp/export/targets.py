@@ -1,0 +1,115 @@
+"""The targets of `export`: what each writes, what it loses, and how its price is measured."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.export.c_source import CompiledModel, c_source
+from friction_ocp.export.fitted import Fitted
+from friction_ocp.export.fmu import write_fmu
+from friction_ocp.export.fmu_run import loaded_fmu
+from friction_ocp.export.joints import Loss, joint_drive
+from friction_ocp.export.mjcf import STEP, STIFF, mjcf_text
+from friction_ocp.export.mujoco_run import MuJoCoRun
+from friction_ocp.export.price import PriceRow, price_table
+from friction_ocp.export.table import table_text
+from friction_ocp.export.urdf import urdf_losses, urdf_text
+from friction_ocp.whole_file import whole_file
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What an export left behind."""
+
+    files: tuple[Path, ...]
+    losses: tuple[Loss, ...] = ()
+    """What the target cannot express."""
+    price: Callable[[], tuple[PriceRow, ...]] | None = None
+    """Measures what the export costs; None for a target that simulates nothing."""
+    simulator: str = ""
+    no_price: str = ""
+    """Why it is not measured, where recordings could be run."""
+
+
+Target = Callable[[Fitted, Path], Exported]
+
+
+def export(fitted: Fitted, kind: str, path: Path) -> Exported:
+    """Write a fitted drive for a target; raises FrictionOcpError for an unknown one."""
+    target = TARGETS.get(kind)
+    if target is None:
+        raise FrictionOcpError(Finding("export", f"unknown target '{kind}'", f"available: {', '.join(TARGETS)}"))
+    if path.is_dir():
+        raise FrictionOcpError(Finding(str(path), "this is a folder", "a file to write"))
+    return target(fitted, path)
+
+
+def _mjcf(fitted: Fitted, path: Path) -> Exported:
+    drive = joint_drive(fitted)
+    text = mjcf_text(drive, fitted.name)
+    _write(path, text)
+    return Exported(
+        (path,), drive.losses, lambda: price_table(fitted, MuJoCoRun(fitted, drive, text, False).simulate), "MuJoCo"
+    )
+
+
+def _urdf(fitted: Fitted, path: Path) -> Exported:
+    drive = joint_drive(fitted, elastic=False)
+    text = urdf_text(drive, fitted.name)
+    _write(path, text)
+
+    def price() -> tuple[PriceRow, ...]:
+        run = MuJoCoRun(fitted, drive, text, True)
+        run.model.opt.timestep = STEP
+        run.model.dof_solref[:] = (2.0 * STEP, 1.0)
+        run.model.dof_solimp[:] = (STIFF, STIFF, 0.001, 0.5, 2.0)
+        return price_table(fitted, run.simulate)
+
+    losses = urdf_losses(drive)
+    if len(fitted.model.drive.mechanism.topology.roots) > 1:
+        why = "what is seen on one side of a spring has no counterpart in a drive without it"
+        return Exported((path,), losses, no_price=why)
+    return Exported((path,), losses, price, "MuJoCo")
+
+
+def _fmu(fitted: Fitted, path: Path) -> Exported:
+    with whole_file(path) as staged:
+        write_fmu(fitted, staged)
+
+    def price() -> tuple[PriceRow, ...]:
+        with loaded_fmu(fitted, path) as run:
+            return price_table(fitted, run.simulate)
+
+    return Exported((path,), (), price, "the FMU")
+
+
+def _c(fitted: Fitted, path: Path) -> Exported:
+    if path.suffix == ".h" or '"' in path.name:
+        raise FrictionOcpError(Finding(str(path), "this cannot be the name of a source file", "NAME.c"))
+    header = path.with_suffix(".h")
+    source = c_source(fitted, header.name)
+    _write(path, source.body)
+    _write(header, source.header)
+
+    def price() -> tuple[PriceRow, ...]:
+        with tempfile.TemporaryDirectory() as folder:
+            return price_table(fitted, CompiledModel(fitted, source, Path(folder)).simulate)
+
+    return Exported((path, header), (), price, "C")
+
+
+def _table(fitted: Fitted, path: Path) -> Exported:
+    _write(path, table_text(fitted))
+    return Exported((path,))
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as staged:
+        staged.write_text(text, encoding="utf-8")
+
+
+TARGETS: Mapping[str, Target] = {"mjcf": _mjcf, "urdf": _urdf, "fmu": _fmu, "c": _c, "table": _table}
