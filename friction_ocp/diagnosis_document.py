@@ -45,7 +45,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "assumptions": _assumptions(diagnosis),
         "seconds": diagnosis.seconds,
         "channel_units": _units(diagnosis),
-        "provenance": provenance(problem),
+        "provenance": provenance(problem, "diagnose"),
     }
 
 

@@ -36,7 +36,11 @@ def fleet_document(fleet: Fleet) -> dict[str, Any]:
         "series": [_series(fleet, item) for item in fleet.series],
         "fits": [_fit(fit) for fit in fleet.fits],
         "provenance": {
-            **provenance(fleet.problem),
+            **provenance(
+                fleet.problem,
+                "batch",
+                {"machine": fleet.machine, "started": fleet.started, "false_alarms": fleet.judgement.rate},
+            ),
             "recordings": {fit.recording: fit.sha256 for fit in fleet.fits},
         },
     }

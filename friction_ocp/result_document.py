@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import importlib.metadata
 import math
 import platform
@@ -17,6 +19,7 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.score import Errors, FreeRun
 from friction_ocp.estimation.static_points import StaticFit
 from friction_ocp.estimation.whiteness import Whiteness
+from friction_ocp.execution.content import fingerprint, toolkit_fingerprint
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries, StateSeries
 from friction_ocp.simulation.grid import FloatArray
@@ -63,7 +66,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             for recording, tests in estimate.residuals.items()
         },
         "channel_units": dict(estimate.simulation.units),
-        "provenance": provenance(estimate.problem),
+        "provenance": provenance(estimate.problem, "identify"),
     }
 
 
@@ -78,7 +81,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "parameters": {},
         "fit": _fit(simulation),
         "channel_units": dict(simulation.units),
-        "provenance": provenance(simulation.problem),
+        "provenance": provenance(simulation.problem, "simulate"),
     }
 
 
@@ -182,17 +185,30 @@ def _whiteness(test: Whiteness) -> dict[str, Any]:
     }
 
 
-def provenance(problem: Problem) -> dict[str, Any]:
-    """Return versions, date, seed and checksums of the recordings."""
+def provenance(problem: Problem, command: str, options: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return all that it takes to make a result again: versions, command, problem, checksums, options and seed."""
     packages = ("friction-ocp", "casadi", "numpy", "scipy")
     return {
         **{name.replace("-", "_"): importlib.metadata.version(name) for name in packages},
         "python": platform.python_version(),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "code": toolkit_fingerprint(),
+        "command": {"name": command, "options": dict(options or {})},
+        "problems": [problem_file(problem)],
+        "model": fingerprint(problem.drive, problem.constraints),
+        "options": dataclasses.asdict(problem.estimation),
         "seed": problem.estimation.seed,
         "recordings": {use.name: use.recording.sha256 for use in problem.recordings}
         | {use.name: use.points.sha256 for use in (*problem.static, *problem.static_validation)},
     }
+
+
+def problem_file(problem: Problem) -> dict[str, Any] | None:
+    """Return path, checksum and content of the file of a problem; None for one that was made otherwise."""
+    if problem.path is None or not problem.text:
+        return None
+    digest = hashlib.sha256(problem.text.encode()).hexdigest()
+    return {"path": problem.path.as_posix(), "sha256": digest, "text": problem.text}
 
 
 def simulation_series(simulation: Simulation) -> dict[str, RecordingSeries]:

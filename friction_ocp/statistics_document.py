@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.result_document import estimate_document
+from friction_ocp.result_document import estimate_document, problem_file, provenance
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.bootstrap import Bootstrap
 from friction_ocp.statistics.compare import Candidate, Comparison
@@ -50,6 +50,7 @@ def multistart_document(found: MultiStart) -> dict[str, Any]:
             "optima": [_optimum(found, members, names) for members in found.clusters],
             "starts": [_start(end, names) for end in found.ends],
         },
+        "provenance": provenance(found.estimate.problem, "multistart", {"starts": len(found.ends)}),
     }
 
 
@@ -93,6 +94,9 @@ def profile_document(found: Profiles) -> dict[str, Any]:
             "threshold": found.threshold,
             "parameters": {item.parameter.name: _profile(item) for item in found.items},
         },
+        "provenance": provenance(
+            found.estimate.problem, "profile", {"parameters": [item.parameter.name for item in found.items]}
+        ),
     }
 
 
@@ -149,6 +153,7 @@ def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
             },
             "draws": {"names": names, "values": found.draws.tolist()},
         },
+        "provenance": provenance(found.estimate.problem, "bootstrap", {"draws": len(found.draws) + found.failed}),
     }
 
 
@@ -181,6 +186,14 @@ def comparison_document(found: Comparison) -> dict[str, Any]:
                 }
                 for item in found.ratios
             ],
+        },
+        "provenance": {
+            **provenance(
+                best.estimate.problem,
+                "compare",
+                {"nested": [[item.special, item.general] for item in found.ratios if item.stated]},
+            ),
+            "problems": [problem_file(item.estimate.problem) for item in found.candidates],
         },
     }
 

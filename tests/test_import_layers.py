@@ -25,6 +25,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("report", "statistics_document", "diagnosis_document", "fleet", "export"),
     ("result_folder", "fleet_document"),
     ("diagnosis_folder", "fleet_folder"),
+    ("repetition",),
     ("cli",),
     ("__init__", "__main__"),
 )

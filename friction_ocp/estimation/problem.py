@@ -87,6 +87,8 @@ class Problem:
     question: str = ""
     """The comment at the head of the problem file: what is asked and what is known."""
     path: Path | None = None
+    text: str = ""
+    """The file as it was read."""
     diagnosis: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """Section `diagnosis` of the file: effects, exclude, significance, as far as stated."""
     limits: Mapping[str, Any] = field(default_factory=dict[str, Any])

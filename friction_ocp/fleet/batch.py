@@ -37,8 +37,10 @@ class Fleet:
     """Fits that this run made."""
     others: int
     """Fits in the store that belong to another problem or version and are left out."""
-    given: tuple[str, ...]
-    """Recordings that this run was given."""
+    machine: str
+    """Attribute that names machines, as stated."""
+    started: str
+    """Attribute with times, as stated."""
 
 
 def batch(
@@ -83,7 +85,8 @@ def batch(
         dated=dated,
         added=len(by_key.keys() - known.keys()),
         others=store.others(name),
-        given=tuple(path.as_posix() for path in paths),
+        machine=machine,
+        started=started,
     )
 
 

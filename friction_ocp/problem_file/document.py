@@ -27,6 +27,7 @@ class Document:
     content: Mapping[str, Any]
     head: str
     """The comment lines before the first key, without their `#`."""
+    text: str = ""
 
 
 class _Loader(yaml.SafeLoader):
@@ -68,10 +69,10 @@ def _construct_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | f
 _Loader.add_constructor(_NUMBER, _construct_number)
 
 
-def read_document(path: Path) -> Document:
-    """Read a YAML mapping; raises FrictionOcpError with every fault of the text."""
+def read_document(path: Path, text: str | None = None) -> Document:
+    """Read a YAML mapping, from a file or as if `text` stood there; raises FrictionOcpError with every fault."""
     where = str(path)
-    text = _read_text(path)
+    text = _read_text(path) if text is None else text
     try:
         loader: Any = _Loader(text)
         node = loader.get_single_node()
@@ -89,7 +90,7 @@ def read_document(path: Path) -> Document:
         raise FrictionOcpError(Finding(where, f"this is not YAML: {' '.join(str(error).split())}")) from error
     except RecursionError as error:
         raise FrictionOcpError(Finding(where, "this is nested too deeply")) from error
-    return Document(path, content, head_comment(text))
+    return Document(path, content, head_comment(text), text)
 
 
 def dump_document(content: Mapping[str, Any], head: str = "") -> str:

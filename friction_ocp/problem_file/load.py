@@ -36,14 +36,14 @@ class _Entry:
         return f"recordings.{self.kind}[{self.index}]"
 
 
-def load_problem(path: str | Path) -> Problem:
-    """Read a problem file and its recordings.
+def load_problem(path: str | Path, text: str | None = None) -> Problem:
+    """Read a problem file and its recordings; with `text` as if that stood in the file.
 
     Raises FrictionOcpError with everything that is wrong with the file, and, once anything is, with the recordings
     too. What only a fit needs, and what is merely doubtful, is left to `check`.
     """
     path = Path(path)
-    document = read_document(path)
+    document = read_document(path, text)
     section, faults = read_section(document.content)
     uses, findings = _read_recordings(document)
     findings = [*(fault.finding(str(path)) for fault in faults), *findings]
@@ -70,6 +70,7 @@ def _build(section: ProblemSection, uses: list[tuple[_Entry, Use]], document: Do
         constraints=tuple(section.constraints),
         question=document.head,
         path=document.path,
+        text=document.text,
         diagnosis=section.diagnosis.model_dump(exclude_unset=True),
         limits=section.limits.model_dump(exclude_unset=True),
     )

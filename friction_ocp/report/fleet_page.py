@@ -35,7 +35,7 @@ def render_fleet(result: Json) -> str:
     """Return the page."""
     with figure_style():
         figures = {name: base64.b64encode(svg_text(one).encode()).decode() for name, one in fleet_figures(result)}
-    provenance = {key: value for key, value in result["provenance"].items() if not isinstance(value, Mapping)}
+    provenance = {key: value for key, value in result["provenance"].items() if not isinstance(value, Mapping | list)}
     drifts, outliers = flagged(result), rows(result, "outliers")
     return render_page(
         "fleet.html",

@@ -52,7 +52,8 @@ def render_report(result: Json, series: Series) -> str:
     friction = friction_payload(rows(result, "friction_curves"))
     solver, provenance = part(result, "solver"), dict(part(result, "provenance"))
     checksums = part(provenance, "recordings")
-    provenance.pop("recordings", None)
+    for key in ("recordings", "problems"):
+        provenance.pop(key, None)
     return render_page(
         "identify.html",
         {

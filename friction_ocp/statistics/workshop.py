@@ -35,9 +35,13 @@ class Workshop:
     def fingerprint(self) -> str:
         """Of all that decides a number: drive, recordings, options, optimum; not of titles, comments and paths."""
         problem = self.problem
+        parts = (problem.static, problem.static_validation)
         uses = [[_content(use) for use in part] for part in (problem.train, problem.validation)]
+        static = [
+            [(use.name, dict(use.set), use.points.sha256, dict(use.points.columns)) for use in part] for part in parts
+        ]
         optimum = None if self.optimum is None else self.optimum.document()
-        return fingerprint(problem.drive, uses, problem.constraints, problem.estimation, optimum)
+        return fingerprint(problem.drive, uses, static, problem.constraints, problem.estimation, optimum)
 
     def at(self, optimum: Optimum) -> Workshop:
         """Return the same problem at its optimum, with the model if that is built."""

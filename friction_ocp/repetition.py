@@ -1,0 +1,274 @@
+"""A result made again from what it says about itself, and whether the numbers agree."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeGuard, cast
+
+from friction_ocp.diagnosis.diagnose import diagnose
+from friction_ocp.diagnosis_folder import save_diagnosis
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.estimate import identify, simulate
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.fleet.batch import STORE, batch
+from friction_ocp.fleet_folder import save_fleet
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.result_document import provenance
+from friction_ocp.result_folder import save, write_text
+from friction_ocp.statistics.bootstrap import bootstrap
+from friction_ocp.statistics.compare import compare
+from friction_ocp.statistics.execution import Execution
+from friction_ocp.statistics.multistart import multistart
+from friction_ocp.statistics.profile import profile
+
+FORMAT = "friction-ocp-rerun/1"
+TOLERANCE = 1e-3
+"""Relative; of lists, relative to their largest number."""
+SHARE_OF_ERROR = 0.01
+"""Standard errors by which a parameter may differ all the same."""
+COMPARED = (
+    "status",
+    "verdict",
+    "parameters",
+    "fit",
+    "multistart",
+    "profile",
+    "bootstrap",
+    "compare",
+    "accepted",
+    "alias_sets",
+    "gap",
+    "biased_parameters",
+    "machines",
+    "drifts",
+    "outliers",
+)
+"""What of a result is its answer."""
+LEFT_OUT = frozenset({"seconds", "iterations", "message", "p_value", "adjusted_p_value", "recording", "after"})
+"""How the answer was reached, what jumps where it does not matter, and where files lay."""
+VERSIONS = ("friction_ocp", "casadi", "numpy", "scipy", "python", "code")
+
+Json = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A number or word that is another one now."""
+
+    where: str
+    before: Any
+    after: Any
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """What came of making a result again."""
+
+    changed: tuple[str, ...]
+    """Inputs that are not what they were: files, versions."""
+    compared: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every number agrees within the tolerance."""
+        return not self.differences
+
+
+def repeat(
+    result: Path, folder: Path, execution: Execution, tolerance: float = TOLERANCE, problem: Path | None = None
+) -> Repetition:
+    """Make the result in a file or folder again, into another folder, and compare the two.
+
+    The problem is what the result holds; recordings are found from where the problem file lay, or from `problem` where
+    it has moved. Raises FrictionOcpError where the result does not say how it was made, or a recording is gone.
+    """
+    path = result / "result.json" if result.is_dir() else result
+    before = read_result(path)
+    made = _provenance(before, path)
+    if (folder / "result.json").exists() and (folder / "result.json").samefile(path):
+        raise FrictionOcpError(Finding(str(folder), "this is where the result lies", remedy="give another --out"))
+    places = [_place(item, path, problem) for item in made["problems"]]
+    problems = [load_problem(place, item["text"]) for place, item in zip(places, made["problems"], strict=True)]
+    _forget_finished(folder)
+    _COMMANDS[made["command"]["name"]](problems, made, folder, execution)
+    after = read_result(folder / "result.json")
+    _forget(folder)
+    pairs = list(_pairs("", *({key: one[key] for key in COMPARED if key in one} for one in (before, after))))
+    differences = tuple(_differences(pairs, tolerance))
+    return Repetition(tuple(_changed(made, after["provenance"], places, problems)), len(pairs), differences)
+
+
+def save_repetition(found: Repetition, folder: Path) -> Path:
+    """Write rerun.json beside the result that was made again and return the folder."""
+    content = {
+        "format": FORMAT,
+        "agrees": found.agrees,
+        "compared": found.compared,
+        "changed": list(found.changed),
+        "differences": [{"where": d.where, "before": d.before, "after": d.after} for d in found.differences],
+    }
+    write_text(folder / "rerun.json", json.dumps(content, indent=1))
+    return folder
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """Read a result.json; raises FrictionOcpError where it is none."""
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        what = f"this cannot be read as a result ({error})"
+        raise FrictionOcpError(Finding(str(path), what, "result.json, or the folder that holds it")) from error
+    if not isinstance(content, dict) or not str(cast("Json", content).get("format", "")).startswith("friction-ocp-"):
+        raise FrictionOcpError(Finding(str(path), "this is not a result", "a result.json of this toolkit"))
+    return cast("dict[str, Any]", content)
+
+
+def _provenance(result: Json, path: Path) -> Json:
+    made: Any = result.get("provenance")
+    try:
+        name, problems = made["command"]["name"], list(made["problems"])
+        known = name in _COMMANDS and all(isinstance(item["text"], str) for item in problems if item is not None)
+    except (TypeError, KeyError):
+        known, problems = False, []
+    if not known:
+        what = "it does not say how it was made"
+        raise FrictionOcpError(Finding(str(path), what, f"a result of {', '.join(_COMMANDS)}", "make it anew"))
+    if not problems or None in problems:
+        what = "its problem was made in Python, not read from a file"
+        raise FrictionOcpError(Finding(str(path), what, remedy="run the script that made it"))
+    return made
+
+
+def _place(item: Json, result: Path, stated: Path | None) -> Path:
+    """Return where the problem file lies, or lay: as stated, as it was named, or beside a folder above the result."""
+    if stated is not None:
+        return stated
+    named = Path(item["path"])
+    above = [folder / named for folder in result.resolve().parents]
+    return next((path for path in (named, *above) if path.exists()), named)
+
+
+def _forget_finished(folder: Path) -> None:
+    """Drop what an earlier repetition that came to its end had made; one that was interrupted goes on."""
+    if (folder / "rerun.json").exists():
+        _forget(folder)
+        (folder / "rerun.json").unlink()
+
+
+def _forget(folder: Path) -> None:
+    shutil.rmtree(folder / "tasks", ignore_errors=True)
+    (folder / STORE).unlink(missing_ok=True)
+
+
+def _identify(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save(identify(problems[0], execution.progress), folder)
+
+
+def _simulate(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save(simulate(problems[0]), folder)
+
+
+def _diagnose(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save_diagnosis(diagnose(problems[0]), folder)
+
+
+def _multistart(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save(multistart(problems[0], made["command"]["options"]["starts"], execution), folder)
+
+
+def _profile(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save(profile(problems[0], made["command"]["options"]["parameters"], execution), folder)
+
+
+def _bootstrap(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    save(bootstrap(problems[0], made["command"]["options"]["draws"], execution), folder)
+
+
+def _compare(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    nested = [(special, general) for special, general in made["command"]["options"]["nested"]]
+    save(compare(problems, nested, execution), folder)
+
+
+def _batch(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    options = made["command"]["options"]
+    files = [Path(name) for name in made["recordings"]]
+    fleet = batch(problems[0], files, folder, **options, executor=execution.executor, watch=execution.watch)
+    save_fleet(fleet, folder)
+
+
+_COMMANDS: Mapping[str, Callable[[Sequence[Problem], Json, Path, Execution], None]] = {
+    "simulate": _simulate,
+    "identify": _identify,
+    "multistart": _multistart,
+    "profile": _profile,
+    "bootstrap": _bootstrap,
+    "compare": _compare,
+    "diagnose": _diagnose,
+    "batch": _batch,
+}
+
+
+def _changed(before: Json, after: Json, places: Sequence[Path], problems: Sequence[Problem]) -> Iterator[str]:
+    """Say what is not as it was when the result was made."""
+    for place, item in zip(places, before["problems"], strict=True):
+        if not place.exists():
+            yield f"{place} is gone; the copy in the result was used"
+        elif hashlib.sha256(place.read_bytes()).hexdigest() != item["sha256"]:
+            yield f"{place} is another file now; the copy in the result was used"
+    for name, digest in before["recordings"].items():
+        found = after["recordings"].get(name)
+        if found != digest:
+            yield f"recording {name} is another file now" if found else f"recording {name} took no part"
+    for name in VERSIONS:
+        if before.get(name) != after.get(name):
+            what = "the code of friction-ocp" if name == "code" else name.replace("_", "-")
+            yield f"{what} was {str(before.get(name))[:12]}, is {str(after.get(name))[:12]}"
+    if before.get("model") != provenance(problems[0], "")["model"]:
+        yield "the problem had been changed in Python after its file was read"
+
+
+def _pairs(where: str, before: Any, after: Any) -> Iterator[tuple[str, Any, Any, float]]:
+    """Yield place, both values and the size that differences are measured by, of everything that either has."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        ours, theirs = cast("Json", before), cast("Json", after)
+        slack = _slack(ours)
+        for key in dict.fromkeys((*ours, *theirs)):
+            if key in LEFT_OUT:
+                continue
+            for name, one, other, size in _pairs(f"{where}.{key}" if where else key, ours.get(key), theirs.get(key)):
+                yield name, one, other, max(size, slack if key in ("value", "interval95") else 0.0)
+    elif isinstance(before, list) and isinstance(after, list) and len(cast("Any", before)) == len(cast("Any", after)):
+        pairs = list(zip(cast("list[Any]", before), cast("list[Any]", after), strict=True))
+        largest = max((abs(v) for pair in pairs for v in pair if _is_number(v)), default=0.0)
+        for index, (one, other) in enumerate(pairs):
+            yield from (
+                (name, a, b, max(size, largest)) for name, a, b, size in _pairs(f"{where}[{index}]", one, other)
+            )
+    else:
+        both = _is_number(before) and _is_number(after)
+        yield where, before, after, max(abs(before), abs(after)) if both else 0.0
+
+
+def _slack(content: Json) -> float:
+    """Return the size of an estimate for which the tolerance is the allowed share of its standard error."""
+    std_error = content.get("std_error")
+    return SHARE_OF_ERROR / TOLERANCE * float(std_error) if _is_number(std_error) else 0.0
+
+
+def _is_number(value: Any) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _differences(pairs: Sequence[tuple[str, Any, Any, float]], tolerance: float) -> Iterator[Difference]:
+    for where, before, after, size in pairs:
+        if _is_number(before) and _is_number(after):
+            if abs(before - after) > tolerance * size:
+                yield Difference(where, before, after)
+        elif before != after:
+            yield Difference(where, before, after)

@@ -1,0 +1,205 @@
+"""A result says how it was made; made again, its numbers are the same, and what changed is named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from servo_problem import write_servo
+
+import friction_ocp as fo
+from friction_ocp.cli import DONE, WRONG_INPUT, main
+from friction_ocp.parameters import Free
+
+sys.path.insert(0, str(Path(__file__).parent / "fleet"))
+
+from simulated_fleet import write_axis, write_fleet
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with nights of one machine, the problem about the first, and its identification."""
+    folder = tmp_path_factory.mktemp("made")
+    files = write_fleet(folder / "nights", 1, 2)
+    problem = write_axis(folder / "axis.yaml", files[0])
+    assert main(["identify", str(problem), "--out", str(folder / "out")]) == DONE
+    return folder
+
+
+@pytest.fixture
+def copied(made: Path, tmp_path: Path) -> Path:
+    """Return a copy of the same, with the result naming the copy, to be changed at will."""
+    folder = tmp_path / "copy"
+    shutil.copytree(made, folder)
+    problem = write_axis(folder / "axis.yaml", folder / "nights" / "telescope-01" / "night-01.h5")
+    assert main(["identify", str(problem), "--out", str(folder / "out")]) == DONE
+    return folder
+
+
+def rerun(folder: Path, *more: str) -> tuple[int, dict[str, Any]]:
+    """Make a result again and return the exit status and rerun.json."""
+    out = folder / "again"
+    status = main(["rerun", str(folder / "out"), "--out", str(out), "--workers", "1", *more])
+    return status, json.loads((out / "rerun.json").read_text(encoding="utf-8"))
+
+
+def test_a_result_says_all_that_it_was_made_from(made: Path) -> None:
+    """Versions, command, the problem word for word, checksums, options and seed."""
+    found = json.loads((made / "out" / "result.json").read_text(encoding="utf-8"))["provenance"]
+    assert {"friction_ocp", "casadi", "numpy", "scipy", "python", "code", "seed", "created"} <= found.keys()
+    assert found["command"] == {"name": "identify", "options": {}}
+    assert found["problems"][0]["text"] == (made / "axis.yaml").read_text(encoding="utf-8")
+    assert found["options"]["fit"] == "simulation" and found["options"]["max_iterations"] == 100
+    assert all(len(digest) == 64 for digest in found["recordings"].values())
+
+
+def test_results_open_without_this_package(made: Path) -> None:
+    """json and h5py read everything: no pickle, no type of our own."""
+    result = json.loads((made / "out" / "result.json").read_text(encoding="utf-8"))
+    with h5py.File(made / "out" / "result.h5") as file:
+        channel = file["night-01/position"]
+        assert channel["time"].shape == channel["measured"].shape == channel["simulated"].shape
+        assert channel["measured"].attrs["unit"] == result["channel_units"]["position"] == "rad"
+
+
+def test_nothing_changed_is_the_same_numbers(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Status 0, no input changed, every number compared; the repetition leaves a result of its own."""
+    status, found = rerun(copied)
+    assert status == DONE and found["agrees"] and found["changed"] == [] and found["compared"] > 20
+    assert "all agree" in capsys.readouterr().out
+    assert (copied / "again" / "report.html").exists()
+
+
+COMMANDS = {
+    "simulate": [],
+    "multistart": ["--starts", "2", "--workers", "1"],
+    "bootstrap": ["--draws", "20", "--workers", "1"],
+    "profile": ["--parameter", "motor.inertia", "--workers", "1"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_other_results_are_made_again_with_their_options(command: str, made: Path, tmp_path: Path) -> None:
+    """The command and its options are in the result."""
+    assert main([command, str(made / "axis.yaml"), "--out", str(tmp_path / "out"), *COMMANDS[command]]) == DONE
+    status, found = rerun(tmp_path)
+    assert (status, found["differences"], found["changed"]) == (DONE, [], [])
+    document = json.loads((tmp_path / "again" / "result.json").read_text(encoding="utf-8"))
+    first = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert document["provenance"]["command"] == first["provenance"]["command"]
+    assert not (tmp_path / "again" / "tasks").exists()
+
+
+def test_a_comparison_is_made_again(made: Path, tmp_path: Path) -> None:
+    """All of its problems are in the result."""
+    text = (made / "axis.yaml").read_text(encoding="utf-8")
+    (made / "fixed.yaml").write_text(text.replace("guess: 0.003", "guess: 0.002"), encoding="utf-8")
+    problems = [str(made / name) for name in ("axis.yaml", "fixed.yaml")]
+    assert main(["compare", *problems, "--out", str(tmp_path / "out"), "--workers", "1"]) == DONE
+    status, found = rerun(tmp_path)
+    assert (status, found["differences"]) == (DONE, [])
+
+
+def test_a_batch_is_made_again(made: Path, tmp_path: Path) -> None:
+    """Its fits are made anew, not taken from the store."""
+    command = ["batch", str(made / "axis.yaml"), str(made / "nights"), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(command) == DONE
+    status, found = rerun(tmp_path)
+    assert (status, found["differences"], found["changed"]) == (DONE, [], [])
+
+
+def test_a_changed_problem_file_is_named_and_not_used(copied: Path) -> None:
+    """The result holds the problem that made it."""
+    path = copied / "axis.yaml"
+    path.write_text(path.read_text(encoding="utf-8").replace("0.35", "0.4"), encoding="utf-8")
+    status, found = rerun(copied)
+    assert status == DONE and found["agrees"]
+    assert found["changed"] == [f"{path} is another file now; the copy in the result was used"]
+
+
+def test_a_changed_recording_is_named_and_the_numbers_differ(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Status 1; what differs is listed with both values."""
+    with h5py.File(copied / "nights" / "telescope-01" / "night-01.h5", "r+") as file:
+        file["channels/position"][...] *= 1.1
+    status, found = rerun(copied)
+    assert status == WRONG_INPUT and not found["agrees"]
+    assert found["changed"] == ["recording night-01 is another file now"]
+    assert "parameters.motor.inertia.value" in {item["where"] for item in found["differences"]}
+    assert "parameters.motor.inertia.value: was" in capsys.readouterr().err
+
+
+def test_a_version_is_named(copied: Path) -> None:
+    """What other code made is told, whether or not it matters."""
+    path = copied / "out" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result["provenance"]["casadi"] = "3.0.0"
+    path.write_text(json.dumps(result), encoding="utf-8")
+    status, found = rerun(copied)
+    assert status == DONE and [text[:19] for text in found["changed"]] == ["casadi was 3.0.0, i"]
+
+
+def test_a_problem_that_moved_is_found_where_it_is_said_to_lie(copied: Path) -> None:
+    """Recordings are found from the new place of the problem file."""
+    moved = copied.with_name("elsewhere")
+    copied.rename(moved)
+    moved_problem = write_axis(moved / "axis.yaml", Path("nights") / "telescope-01" / "night-01.h5")
+    result = json.loads((moved / "out" / "result.json").read_text(encoding="utf-8"))
+    result["provenance"]["problems"][0]["text"] = moved_problem.read_text(encoding="utf-8")
+    (moved / "out" / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    status, found = rerun(moved, "--problem", str(moved_problem))
+    assert status == DONE and found["agrees"]
+
+
+def test_a_problem_changed_in_python_is_told(copied: Path) -> None:
+    """The file in the result is then not what was fitted."""
+    problem = fo.load_problem(copied / "axis.yaml")
+    (shaft,) = problem.drive.shafts
+    drive = replace(problem.drive, shafts=(replace(shaft, inertia=Free(0.002, 0.0015, 0.0018)),))
+    fo.save(fo.identify(replace(problem, drive=drive)), copied / "out")
+    status, found = rerun(copied)
+    assert status == WRONG_INPUT
+    assert "the problem had been changed in Python after its file was read" in found["changed"]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("{", "cannot be read as a result"),
+        ("[]", "this is not a result"),
+        ('{"format": "friction-ocp-result/1"}', "it does not say how it was made"),
+        (
+            '{"format": "friction-ocp-result/1", "provenance": {"command": {"name": "identify"}, "problems": [null]}}',
+            "its problem was made in Python",
+        ),
+        (
+            '{"format": "friction-ocp-result/1", "provenance": {"command": {"name": "rm"}, "problems": []}}',
+            "it does not say how it was made",
+        ),
+    ],
+)
+def test_what_is_no_result_is_wrong_input(
+    text: str, complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 1 and a reason, whatever the file holds."""
+    (tmp_path / "result.json").write_text(text, encoding="utf-8")
+    assert main(["rerun", str(tmp_path), "--out", str(tmp_path / "again")]) == WRONG_INPUT
+    assert complaint in capsys.readouterr().err
+
+
+def test_a_result_is_not_overwritten_by_its_repetition(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The folder of the result is refused as output."""
+    assert main(["rerun", str(made / "out"), "--out", str(made / "out")]) == WRONG_INPUT
+    assert "give another --out" in capsys.readouterr().err
+
+
+def test_the_servo_is_the_same_again(tmp_path: Path) -> None:
+    """A closed loop with two recordings, one of them held out."""
+    assert main(["identify", str(write_servo(tmp_path)), "--out", str(tmp_path / "out")]) == DONE
+    status, found = rerun(tmp_path)
+    assert (status, found["differences"], found["changed"]) == (DONE, [], [])
