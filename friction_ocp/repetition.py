@@ -251,8 +251,8 @@ def _pairs(where: str, before: Any, after: Any) -> Iterator[tuple[str, Any, Any,
                 (name, a, b, max(size, largest)) for name, a, b, size in _pairs(f"{where}[{index}]", one, other)
             )
     else:
-        both = _is_number(before) and _is_number(after)
-        yield where, before, after, max(abs(before), abs(after)) if both else 0.0
+        both = cast("tuple[Any, Any]", (before, after))
+        yield where, *both, max((abs(value) for value in both if _is_number(value)), default=0.0)
 
 
 def _slack(content: Json) -> float:
