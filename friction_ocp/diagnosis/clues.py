@@ -12,11 +12,11 @@ from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Track
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.losses import Squares
 
 SMOOTHING_STEPS = 4
 

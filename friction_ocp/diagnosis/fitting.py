@@ -14,12 +14,12 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
-from friction_ocp.estimation.losses import Absolute, Squares
 from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Absolute, Squares
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
 QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=5)

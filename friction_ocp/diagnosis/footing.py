@@ -16,12 +16,12 @@ from friction_ocp.drive.parts import Channel, Motor
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
-from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.model import Model, seen_by, standstill_slope, typical_inputs
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program, Segments
 from friction_ocp.estimation.stages import windows
 from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 linalg: Any = _linalg  # its own types are incomplete
 

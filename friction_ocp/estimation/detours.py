@@ -8,13 +8,13 @@ import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
-from friction_ocp.estimation.losses import Absolute, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import COARSE, Fitted, final_solver, limits
 from friction_ocp.estimation.stages import ROUNDINGS, mean_error
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""

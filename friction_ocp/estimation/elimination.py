@@ -30,7 +30,7 @@ class Reduced:
 
     def node_steps(self, step: FloatArray) -> tuple[FloatArray, ...]:
         """Return the node steps that belong to a parameter step."""
-        return tuple(item.constant + item.by_theta @ step for item in self.recordings)
+        return tuple(item.constant + np.tensordot(item.by_theta, step, 1) for item in self.recordings)
 
 
 def reduce_system(system: Linearisation, damping: float, scale: FloatArray | None = None) -> Reduced:
@@ -51,25 +51,46 @@ def reduce_system(system: Linearisation, damping: float, scale: FloatArray | Non
 
 
 def _eliminate(blocks: Blocks, damping: float) -> Eliminated:
-    """Solve the block-tridiagonal node system for -[gradient, node_theta] (block Thomas algorithm)."""
-    count, states = blocks.node_gradient.shape
+    """Solve the block-tridiagonal node system for -[gradient, node_theta]."""
     right = -np.concatenate([blocks.node_gradient[:, :, None], blocks.node_theta], axis=2)
     diagonal = blocks.node_node.copy()
-    index = np.arange(int(states))
+    index = np.arange(int(right.shape[1]))
     diagonal[:, index, index] *= 1.0 + damping
     diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
-    upper = np.empty_like(blocks.node_next)
-    for j in range(count):
-        if j:
-            lower = blocks.node_next[j - 1].T
-            diagonal[j] -= lower @ upper[j - 1]
-            right[j] -= lower @ right[j - 1]
-        if j < count - 1:
-            both = np.concatenate([blocks.node_next[j], right[j]], axis=1)
-            solved = np.asarray(np.linalg.solve(diagonal[j], both), dtype=np.float64)
-            upper[j], right[j] = solved[:, :states], solved[:, states:]
-        else:
-            right[j] = np.linalg.solve(diagonal[j], right[j])
-    for j in range(count - 2, -1, -1):
-        right[j] -= upper[j] @ right[j + 1]
-    return Eliminated(right[:, :, 0], right[:, :, 1:])
+    joined = bool(np.any(blocks.node_next))
+    solved = _cyclic_reduction(diagonal, blocks.node_next, right) if joined else _solve(diagonal, right)
+    return Eliminated(solved[:, :, 0], solved[:, :, 1:])
+
+
+def _cyclic_reduction(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a symmetric positive block-tridiagonal system: every other block at once, then what is left.
+
+    `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s, k). Source: Golub, Van Loan,
+    Matrix Computations, 4.5.4.
+    """
+    count, states = diagonal.shape[:2]
+    if count == 1:
+        return _solve(diagonal, right)
+    odd = count // 2
+    before, after = upper[0::2], upper[1::2]
+    following = after if len(after) == odd else np.concatenate([after, np.zeros((1, states, states))])
+    sides = [before.transpose(0, 2, 1), following, right[1::2]]
+    solved = _solve(diagonal[1::2], np.concatenate(sides, axis=2))
+    to_left, to_right, alone = solved[:, :, :states], solved[:, :, states : 2 * states], solved[:, :, 2 * states :]
+    even, rest = diagonal[0::2].copy(), right[0::2].copy()
+    even[:odd] -= before @ to_left
+    rest[:odd] -= before @ alone
+    back, inner = after.transpose(0, 2, 1), len(after)
+    even[1 : inner + 1] -= back @ to_right[:inner]
+    rest[1 : inner + 1] -= back @ alone[:inner]
+    coupling = -(before[: len(even) - 1] @ to_right[: len(even) - 1])
+    kept = _cyclic_reduction(even, coupling, rest)
+    result = np.empty_like(right)
+    result[0::2] = kept
+    result[1::2] = alone - to_left @ kept[:odd]
+    result[1::2][:inner] -= to_right[:inner] @ kept[1 : inner + 1]
+    return result
+
+
+def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)

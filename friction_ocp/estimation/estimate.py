@@ -16,7 +16,6 @@ from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
 from friction_ocp.estimation.influence import influence
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model, prepare, prepare_fit
 from friction_ocp.estimation.noise import NoiseFloor
 from friction_ocp.estimation.problem import Problem
@@ -29,6 +28,7 @@ from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, whiteness
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
 
 ChannelErrors = Mapping[str, tuple[Errors, Mapping[str, Errors]]]
 

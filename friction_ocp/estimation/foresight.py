@@ -9,13 +9,13 @@ import numpy as np
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import CONDITION_INDEX, Verdict, verdicts
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
 from friction_ocp.estimation.stages import WIDTHS, along_measurement, free_run
 from friction_ocp.estimation.uncertainty import NO_INFORMATION, SMALLEST_INFORMATION, Uncertainty
 from friction_ocp.simulation.grid import BoolArray, FloatArray
+from friction_ocp.simulation.losses import Squares
 
 NEARBY = 2
 """Points beside the guess: what is doubtful at all of them is so by the recordings, not by the guess."""

@@ -25,28 +25,29 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     durations = np.diff(item.grid.time[first])[:-1]
     if not model.problem.estimation.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
-    roots = [np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, span))) for span in durations]
-    return np.array(roots, dtype=np.float64)
+    roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations)))
+    return np.asarray(roots, dtype=np.float64)
 
 
-def gap_covariance(model: Model, item: Experiment, span: float) -> FloatArray:
-    """Return the covariance that torque noise gathers over `span` s in angles and speeds.
+def gap_covariance(model: Model, item: Experiment, spans: FloatArray) -> FloatArray:
+    """Return (spans, states, states) the covariances that torque noise gathers over `spans` s in angles and speeds.
 
     Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
     cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
     """
     mech = model.drive.mechanism
     bristle = np.array([name.endswith(".friction.z") for name in model.drive.state_names])
-    covariance = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
+    still = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
+    covariance = np.tile(still, (spans.size, 1, 1))
     noise = _group_noise(model, item)
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):
         v, q = len(mech.angle_groups) + k, position[group]
-        power = noise[group] ** 2 * span
-        covariance[v, v] += power
-        covariance[q, q] += power * span**2 / 3.0
-        covariance[q, v] += power * span / 2.0
-        covariance[v, q] += power * span / 2.0
+        power = noise[group] ** 2 * spans
+        covariance[:, v, v] += power
+        covariance[:, q, q] += power * spans**2 / 3.0
+        covariance[:, q, v] += power * spans / 2.0
+        covariance[:, v, q] += power * spans / 2.0
     return covariance
 
 

@@ -84,6 +84,8 @@ class _Iterate:
     point: Point
     system: Linearisation
     trust: Trust
+    bold: bool = True
+    """Whether the first trial of the step before was taken: the next one is then linearised at once."""
 
 
 def solve_gauss_newton(
@@ -123,12 +125,14 @@ def _descend(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterat
         trial, predicted = trial_step(program.space, now.point, system, damping, now.trust.scale)
         if predicted <= enough and damping <= TRUSTED and _remaining(program, now) <= enough:
             return now
-        gained = system.objective - program.objective(trial)
+        first = damping == now.trust.damping
+        after = program.linearise(trial) if first and now.bold else None
+        gained = system.objective - (after.objective if after else program.objective(trial))
         if gained > 1e-4 * max(predicted, 0.0) and gained > 0:
-            after = program.linearise(trial)
+            after = after or program.linearise(trial)
             if damping > BLIND or not np.any(_faded(after, now.trust.scale, LOST)):
                 trust = Trust(damping, now.trust.scale).after(gained / max(predicted, 1e-300), after)
-                return _Iterate(trial, after, trust)
+                return _Iterate(trial, after, trust, first)
         damping, grow = damping * grow, grow * 2.0
     return None
 

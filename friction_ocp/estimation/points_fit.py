@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.release import released
 from friction_ocp.estimation.stages import program_of
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
 
 RANDOM_STARTS = 20
 REACH = 1.0

@@ -7,18 +7,18 @@ recording the gaps vanish and the program is the free run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.losses import AbstractLoss, Squares
-from friction_ocp.estimation.normal_equations import NormalEquations, batches
+from friction_ocp.estimation.normal_equations import NormalEquations
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import FloatArray, IntArray
-from friction_ocp.simulation.kernel import SweepRequest, SweepResult
+from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yardstick
+from friction_ocp.simulation.losses import AbstractLoss, Squares
 from friction_ocp.simulation.sweep import Sweep
 
 
@@ -132,6 +132,15 @@ class Program:
         """Simulate all recordings, side by side."""
         return self.sweep.run_many([self._request(k, point, derivatives) for k in range(len(self.experiments))])
 
+    def _scored(self, point: Point, derivatives: bool = False) -> list[tuple[SweepResult, Score]]:
+        """Simulate all recordings, comparing with their measurements on the way."""
+        requests = [
+            replace(self._request(k, point, derivatives), yardstick=Yardstick(item.measured, self.noise, self.loss))
+            for k, item in enumerate(self.experiments)
+        ]
+        results = self.sweep.run_many(requests)
+        return [(result, result.score) for result in results if result.score is not None]
+
     def _request(self, index: int, point: Point, derivatives: bool, with_states: bool = False) -> SweepRequest:
         item, cut = self.experiments[index], self.segments[index]
         nodes = point.nodes[index]
@@ -148,13 +157,9 @@ class Program:
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
         total = _prior_cost(self.space, point.theta) + self._static_cost(point.theta)
-        results = self.simulate_all(point)
-        for index, (item, cut) in enumerate(zip(self.experiments, self.segments, strict=True)):
-            result = results[index]
-            errors = self.residuals(index, result.y)
-            cost = self.loss.cost(errors[np.isfinite(item.measured)])
-            total += float(np.sum(cost)) + self._gap_cost(cut, point.nodes[index], result.end)
-            total += self._start_cost(index, point)
+        for index, (result, score) in enumerate(self._scored(point)):
+            total += float(np.sum(score.cost)) + self._start_cost(index, point)
+            total += self._gap_cost(self.segments[index], point.nodes[index], result.end)
         return total if np.isfinite(total) else np.inf
 
     def _static_cost(self, theta: FloatArray) -> float:
@@ -189,8 +194,8 @@ class Program:
             hessian += slope.T @ slope
             gradient += slope.T @ errors
         blocks: list[Blocks] = []
-        for index, result in enumerate(self.simulate_all(point, derivatives=True)):
-            cost, by_theta, slope, block = self._linearise_recording(index, point, result)
+        for index, (result, score) in enumerate(self._scored(point, derivatives=True)):
+            cost, by_theta, slope, block = self._linearise_recording(index, point, result, score)
             total += cost
             hessian += by_theta
             gradient += slope
@@ -198,31 +203,19 @@ class Program:
         return Linearisation(total if np.isfinite(total) else np.inf, hessian, gradient, tuple(blocks))
 
     def _linearise_recording(
-        self, index: int, point: Point, result: SweepResult
+        self, index: int, point: Point, result: SweepResult, score: Score
     ) -> tuple[float, FloatArray, FloatArray, Blocks]:
         cut, nodes = self.segments[index], point.nodes[index]
-        assert result.dy is not None and result.dend is not None
+        assert score.gradient is not None and score.square is not None
         _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
         states, count = nodes.shape[1], point.theta.size
         system = NormalEquations.empty(cut.count, states, count)
-        self._add_measurements(index, result, slope, system)
+        system.cost += float(np.sum(score.cost))
+        system.add_squares(slice(0, cut.count), score.square, score.gradient, slope)
         self._add_gaps(cut, nodes, result, slope, system)
         self._add_start(index, point, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
-
-    def _add_measurements(self, index: int, result: SweepResult, slope: FloatArray, system: NormalEquations) -> None:
-        item, cut = self.experiments[index], self.segments[index]
-        assert result.dy is not None
-        errors = self.residuals(index, result.y)
-        seen = np.isfinite(item.measured)
-        errors = np.where(seen, errors, 0.0)
-        system.cost += float(np.sum(self.loss.cost(errors[seen])))
-        weight = np.where(seen, self.loss.weight(errors), 0.0)
-        weight, scaled = weight / self.noise**2, errors * self.noise
-        for batch in batches(cut.first):
-            parts = (batch.take(result.dy), batch.take(scaled), batch.weights(weight))
-            system.add(batch.segments, *parts, slope)
 
     def _add_gaps(
         self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: NormalEquations

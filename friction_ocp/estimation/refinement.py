@@ -8,13 +8,13 @@ import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
-from friction_ocp.estimation.losses import Absolute
 from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import Fitted, limits
 from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Absolute
 
 SHIFT = 0.1
 """How far, in standard errors, half the step may move any parameter."""

@@ -8,8 +8,10 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.simulation.grid import FloatArray
 
-SHARES = (0.3, 1.0, 4.0)
+SHARES = (0.3, 1.0)
 """Stribeck parts over the Coulomb friction from which the released parameters start."""
+COVERED = (0.02, 3.0)
+"""Stribeck speeds over the typical speed that the released starts stand for."""
 HIGHEST = 0.7
 """Highest start of a break or a Stribeck speed over the top speed."""
 RELEASES = ((0.05, 0.4), (0.2, 0.8), (1.0, 1.5))
@@ -19,20 +21,29 @@ RELEASES = ((0.05, 0.4), (0.2, 0.8), (1.0, 1.5))
 def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[FloatArray]:
     """Return starts of the full model around the answer of the nested one.
 
-    What the nested model does not have starts from the guess, and from several places in the range of speeds with
-    Stribeck parts of several sizes.
+    Speeds and sizes that the nested model does not have start from several places in the range of speeds with Stribeck
+    parts of several sizes, the same whatever the guess: a free run has many ends, and which of them is found must not
+    hang on it. The guess is one more start where it lies far from all of these.
     """
     known = dict(zip(simple.names, theta, strict=True))
-    starts = [np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])]
+    guess = np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])
     shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
+    starts: list[FloatArray] = []
     for place, highest_break in RELEASES:
         for share in shares:
             values = [
-                _released_value(model, name, known, (place, highest_break), share, starts[0][k])
+                _released_value(model, name, known, (place, highest_break), share, guess[k])
                 for k, name in enumerate(model.space.names)
             ]
-            starts.append(np.array(values))
-    return [model.space.clip(start) for start in starts]
+            starts.append(model.space.clip(np.array(values)))
+    return starts if _is_covered(model, guess) else [model.space.clip(guess), *starts]
+
+
+def _is_covered(model: Model, guess: FloatArray) -> bool:
+    """Whether the Stribeck speeds of a start, of which there are some, lie where the released ones can come."""
+    speeds = [k for k, name in enumerate(model.space.names) if ".omega_s" in name]
+    places = [guess[k] / _typical_speed(model, model.space.names[k]) for k in speeds]
+    return bool(places) and all(COVERED[0] <= place <= COVERED[1] for place in places)
 
 
 def _released_value(

@@ -9,7 +9,6 @@ import numpy as np
 
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
-from friction_ocp.estimation.losses import AbstractLoss, Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
@@ -17,6 +16,7 @@ from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.release import released
 from friction_ocp.estimation.stages import WIDTHS, free_run, loss_of_round, mean_error, predictions, relaxed, rounds_of
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()

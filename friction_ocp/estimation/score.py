@@ -10,11 +10,11 @@ import numpy as np
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.horizon import fits_free_run, horizon
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import free_run, relaxed
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import gap_weights
 from friction_ocp.estimation.horizon import fits_free_run
-from friction_ocp.estimation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program, Segments
 from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 PREDICTION_SAMPLES = 20
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)

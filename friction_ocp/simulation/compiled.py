@@ -57,12 +57,19 @@ class CompiledKernel(AbstractKernel):
             np.ascontiguousarray(request.x0[begin:stop], dtype=float),
         ]
         dend = None if into.dend is None else into.dend[begin:stop]
+        by, sums = request.yardstick, (None, None, None)
+        if into.score is not None:
+            parts = (into.score.cost, into.score.gradient, into.score.square)
+            sums = tuple(None if part is None else part[begin:stop] for part in parts)
         self._sweep(
             ctypes.c_long(stop - begin),
             ctypes.c_int(stop == len(first) - 1),
             *(_pointer(item) for item in course),
+            *(_pointer(item) for item in ((by.measured, by.noise) if by else (None, None))),
+            ctypes.c_int(by.loss.code if by else 0),
+            ctypes.c_double(by.loss.parameter if by else 0.0),
             ctypes.c_int(request.derivatives),
-            *(_pointer(item) for item in (into.states, into.y, into.dy, into.end[begin:stop], dend)),
+            *(_pointer(item) for item in (into.states, into.y, into.dy, into.end[begin:stop], dend, *sums)),
         )
 
 

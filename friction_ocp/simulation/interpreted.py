@@ -13,6 +13,7 @@ from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray, Grid, IntArray
 from friction_ocp.simulation.kernel import AbstractKernel, SweepRequest, SweepResult
 from friction_ocp.simulation.maps import delay_indices, sweep_maps
+from friction_ocp.simulation.scoring import add_score
 
 CHUNKS = (1024, 256, 64, 16, 4, 1)
 """Lengths of the compiled loops from which a segment of any length is put together."""
@@ -82,7 +83,7 @@ class InterpretedKernel(AbstractKernel):
             tracks.append(track[:, plan.node[seen]])
             instants.append(plan.h[seen])
         if tracks:
-            self._observe(request, int(request.first[begin]), np.concatenate(instants), np.hstack(tracks), into)
+            self._observe(request, range(begin, stop), np.concatenate(instants), np.hstack(tracks), into)
 
     def _course(self, request: SweepRequest, x0: FloatArray, controls: FloatArray) -> FloatArray:
         """Return the state, its sensitivities and the unknown torques before and after every operation."""
@@ -107,7 +108,10 @@ class InterpretedKernel(AbstractKernel):
         size = states * (states + len(self._active))
         return track[states : states + size].T.reshape(track.shape[1], -1, states).transpose(0, 2, 1)
 
-    def _observe(self, request: SweepRequest, begin: int, h: FloatArray, track: FloatArray, into: SweepResult) -> None:
+    def _observe(
+        self, request: SweepRequest, segments: range, h: FloatArray, track: FloatArray, into: SweepResult
+    ) -> None:
+        begin = int(request.first[segments.start])
         rows = slice(begin, begin + h.size)
         if into.states is not None:
             into.states[rows] = track[: self._states].T
@@ -118,10 +122,15 @@ class InterpretedKernel(AbstractKernel):
         motion = (track[: self._states], request.grid.at_node[rows].T, request.p, h[None, :], request.width)
         values = [np.asarray(value) for value in function.map(h.size).call([*motion, np.zeros(function.size1_in(5))])]
         into.y[rows] = values[0].T
-        if into.dy is not None:
+        dy: FloatArray | None = None
+        if request.derivatives:
             by_state, by_active = (value.reshape(len(value), h.size, -1).transpose(1, 0, 2) for value in values[2:])
-            into.dy[rows] = by_state @ self._sensitivities(track)
-            into.dy[rows, :, self._states :] += by_active
+            dy = by_state @ self._sensitivities(track)
+            dy[:, :, self._states :] += by_active
+        if into.dy is not None:
+            into.dy[rows] = dy
+        if into.score is not None:
+            add_score(into.score, request, segments, into.y[rows], dy, begin)
 
     def _new_output(self, delayed: bool, derivatives: bool) -> ca.Function:
         output = self._maps["output" if delayed else "now"]

@@ -9,6 +9,18 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
+from friction_ocp.simulation.losses import AbstractLoss
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """Measurements that outputs are compared with while they are simulated."""
+
+    measured: FloatArray
+    """(n, outputs), NaN where there is no sample."""
+    noise: FloatArray
+    """(outputs,) noise floors."""
+    loss: AbstractLoss
 
 
 @dataclass(frozen=True)
@@ -26,6 +38,20 @@ class SweepRequest:
     """(groups + 1,) smoothing; zeros are exact."""
     derivatives: bool = False
     with_states: bool = False
+    yardstick: Yardstick | None = None
+    """With it the sweep sums a score over each segment in place of keeping every derivative of its outputs."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Losses of all samples of each segment; derivatives by [initial state, active parameters]."""
+
+    cost: FloatArray
+    """(segments,)."""
+    gradient: FloatArray | None = None
+    """(segments, columns)."""
+    square: FloatArray | None = None
+    """(segments, columns, columns) Gauss-Newton Hessian."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +63,13 @@ class SweepResult:
     end: FloatArray
     """(segments, states)."""
     dy: FloatArray | None = None
-    """(n, outputs, states + active)."""
+    """(n, outputs, states + active); None with a yardstick."""
     dend: FloatArray | None = None
     """(segments, states, states + active)."""
     states: FloatArray | None = None
     """(n, states), where asked for."""
+    score: Score | None = None
+    """Where there is a yardstick."""
 
 
 class AbstractKernel(ABC):
@@ -61,11 +89,18 @@ class AbstractKernel(ABC):
 def empty_result(request: SweepRequest, states: int, outputs: int, active: int) -> SweepResult:
     """Return the arrays that a kernel fills."""
     nodes, segments, columns = request.grid.time.size, len(request.first) - 1, states + active
-    wanted = request.derivatives
+    wanted, scored = request.derivatives, request.yardstick is not None
     return SweepResult(
         y=np.zeros((nodes, outputs)),
         end=np.empty((segments, states)),
-        dy=np.zeros((nodes, outputs, columns)) if wanted else None,
+        dy=np.zeros((nodes, outputs, columns)) if wanted and not scored else None,
         dend=np.empty((segments, columns, states)).transpose(0, 2, 1) if wanted else None,
         states=np.empty((nodes, states)) if request.with_states else None,
+        score=_empty_score(segments, columns, wanted) if scored else None,
     )
+
+
+def _empty_score(segments: int, columns: int, derivatives: bool) -> Score:
+    if not derivatives:
+        return Score(np.zeros(segments))
+    return Score(np.zeros(segments), np.zeros((segments, columns)), np.zeros((segments, columns, columns)))

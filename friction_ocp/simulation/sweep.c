@@ -12,6 +12,7 @@
    Nothing here is static: calls from several threads at once are safe. */
 
 #define NC (NX + NA)
+#define SQUARE (NC * NC)
 #define NEWTON_LIMIT 15
 #define NEWTON_TOLERANCE 1e-8 /* of the last correction; Newton's method squares it */
 
@@ -23,6 +24,20 @@ typedef struct {
   double value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], moved[(NX + NY) * NC + 1];
   double step_torques[NL + 1], output_torques[NL + 1], constants[NK + 1];
 } work_space;
+
+/* What a sweep is compared with: samples (n x NY, NaN where there is none) at the first node of a segment, their noise
+   floors, and the loss by kind and parameter (kernel.py). */
+typedef struct {
+  const double *measured, *noise;
+  int loss;
+  double parameter;
+} yardstick;
+
+/* Where the comparison is summed over a segment: cost and, with sensitivities, gradient (NC) and the lower triangle of
+   the Gauss-Newton Hessian (NC x NC, row major). */
+typedef struct {
+  double cost, *gradient, *square;
+} score;
 
 /* Grid, inputs and parameters of a segment; all pointers at its first node. */
 typedef struct {
@@ -96,24 +111,66 @@ static void tick(const course *at, long k, double kind, double *x, double *s, wo
 #endif
 }
 
-/* Write outputs y (NY) and, where s and dy are given, dy (NY x NC, row major) at node k. */
+/* Cost rho(r) of a residual in noise floors; its weight rho'(r) / r goes to *weight. Sources: losses.py. */
+static inline double cost_of(const yardstick *by, double r, double *weight) {
+  double p = by->parameter, size = fabs(r);
+  switch (by->loss) {
+    case 1:
+      size = sqrt(r * r + p * p);
+      *weight = 1.0 / size;
+      return size - p;
+    case 2:
+      *weight = size > p ? p / size : 1.0;
+      return size > p ? p * (size - 0.5 * p) : 0.5 * r * r;
+    case 3:
+      *weight = (p + 1.0) / (p + r * r);
+      return 0.5 * (p + 1.0) * log1p(r * r / p);
+    default:
+      *weight = 1.0;
+      return 0.5 * r * r;
+  }
+}
+
+/* Add the comparison of outputs y at node k; with `derivatives` their sensitivities are in work->moved (NY x NC,
+   column major). */
+static void compare(const yardstick *by, long k, const double *y, int derivatives, score *sum, work_space *work) {
+  double v[NC + 1];
+  for (int i = 0; i < NY; ++i) {
+    double sample = by->measured[k * NY + i], weight;
+    if (!isfinite(sample)) continue;
+    double error = (y[i] - sample) / by->noise[i];
+    sum->cost += cost_of(by, error, &weight);
+    if (!derivatives) continue;
+    for (int c = 0; c < NC; ++c) v[c] = work->moved[c * NY + i] / by->noise[i];
+    for (int c = 0; c < NC; ++c) {
+      double pull = weight * v[c], *row = sum->square + c * NC;
+      sum->gradient[c] += pull * error;
+      for (int d = 0; d <= c; ++d) row[d] += pull * v[d];
+    }
+  }
+}
+
+/* Write outputs y (NY) and, where s is given, their sensitivities to work->moved (NY x NC, column major) and, where dy
+   is given, to dy (NY x NC, row major) at node k. */
 static void observe(const course *at, long k, double h, const double *x, const double *s, double *y, double *dy,
                     work_space *work) {
   const double **arg = work->arg;
-  int derivatives = s && dy;
+  int derivatives = s != 0;
   arg[0] = x, arg[1] = at->un + k * NU, arg[2] = at->p, arg[3] = &h, arg[4] = at->width;
   evaluate(at->output, work->output_torques, derivatives, work);
   memcpy(y, work->value, sizeof(double) * NY);
   if (!derivatives) return;
   chain(NY, work->a, work->b, s, work->moved);
+  if (!dy) return;
   for (int i = 0; i < NY; ++i)
     for (int c = 0; c < NC; ++c) dy[i * NC + c] = work->moved[c * NY + i];
 }
 
 /* One segment: state x and sensitivities s (or NULL) advance in place; states (n x NX), y (n x NY) and dy
-   (n x NY x NC), each of which may be NULL, are written at the nodes. The closing node is the next segment's first:
-   only the last segment, which `closes`, ticks and writes it. */
-static void segment(const course *at, double *x, double *s, double *states, double *y, double *dy, int closes) {
+   (n x NY x NC), each of which may be NULL, are written at the nodes; where there is a yardstick, outputs are compared
+   with it. The closing node is the next segment's first: only the last segment, which `closes`, ticks and writes it. */
+static void segment(const course *at, double *x, double *s, double *states, double *y, double *dy,
+                    const yardstick *by, score *sum, int closes) {
   work_space work;
   double u[NU + 1], h = at->dt[0] / (double)at->substeps[0];
   memset(work.step_torques, 0, sizeof work.step_torques);
@@ -125,7 +182,10 @@ static void segment(const course *at, double *x, double *s, double *states, doub
     if (at->ticks[k] & 1) tick(at, k, 1.0, x, s, &work);
     if (at->dt[k] > 0.0) h = at->dt[k] / (double)at->substeps[k];
     if (states) memcpy(states + k * NX, x, sizeof(double) * NX);
-    if (y && NY > 0) observe(at, k, h, x, s, y + k * NY, dy ? dy + k * NY * NC : 0, &work);
+    if (y && NY > 0) {
+      observe(at, k, h, x, dy || by ? s : 0, y + k * NY, dy ? dy + k * NY * NC : 0, &work);
+      if (by) compare(by, k, y + k * NY, s != 0, sum, &work);
+    }
     if (last) return;
     for (long sub = 0; sub < at->substeps[k]; ++sub) {
       double share = (sub + 0.5) / (double)at->substeps[k];
@@ -146,18 +206,23 @@ static const map *output_map(const double *p) {
 }
 
 /* Segments one after the other: segment j covers nodes first[j] .. first[j + 1]; the last one `closes` the
-   recording or not. Grid arrays and y, dy, states begin at node 0 of the recording.
-   x0 (segments x NX) -> end (segments x NX) and, with `derivatives`, dend (segments x NX x NC, column major). */
+   recording or not. Grid arrays, measured and y, dy, states begin at node 0 of the recording.
+   x0 (segments x NX) -> end (segments x NX) and, with `derivatives`, dend (segments x NX x NC, column major).
+   Where there is `measured`: cost (segments) and, with `derivatives`, gradient (segments x NC) and square (segments x
+   NC x NC), zeros before. */
 SWEEP_EXPORT void friction_ocp_sweep(long segments, int closes, const long *first, const double *dt,
                                      const long *substeps, const long *ticks, const double *u0, const double *u1,
                                      const double *un, const double *p, const double *width, const double *x0,
+                                     const double *measured, const double *noise, int loss, double parameter,
                                      int derivatives, double *states, double *y, double *dy, double *end,
-                                     double *dend) {
+                                     double *dend, double *cost, double *gradient, double *square) {
   const map *output = output_map(p);
   for (long j = 0; j < segments; ++j) {
     long begin = first[j], count = first[j + 1] - begin + 1;
     course at = {count,           dt + begin,      substeps + begin, ticks + begin, u0 + begin * NU,
                  u1 + begin * NU, un + begin * NU, p,                width,         output};
+    yardstick by = {measured ? measured + begin * NY : 0, noise, loss, parameter};
+    score sum = {0.0, derivatives && measured ? gradient + j * NC : 0, derivatives && measured ? square + j * SQUARE : 0};
     double x[NX + 1], s[NX * NC + 1];
     memcpy(x, x0 + j * NX, sizeof(double) * NX);
     if (derivatives) {
@@ -165,8 +230,13 @@ SWEEP_EXPORT void friction_ocp_sweep(long segments, int closes, const long *firs
       for (int i = 0; i < NX; ++i) s[i * NX + i] = 1.0;
     }
     segment(&at, x, derivatives ? s : 0, states ? states + begin * NX : 0, y ? y + begin * NY : 0,
-            (derivatives && dy) ? dy + begin * NY * NC : 0, closes && j == segments - 1);
+            (derivatives && dy) ? dy + begin * NY * NC : 0, measured ? &by : 0, &sum, closes && j == segments - 1);
     memcpy(end + j * NX, x, sizeof(double) * NX);
     if (derivatives) memcpy(dend + j * NX * NC, s, sizeof(double) * NX * NC);
+    if (!measured) continue;
+    cost[j] = sum.cost;
+    if (derivatives)
+      for (int c = 0; c < NC; ++c)
+        for (int d = 0; d < c; ++d) sum.square[d * NC + c] = sum.square[c * NC + d];
   }
 }

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.rounds import Fitted, program_builder
+from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 LOSSES: Mapping[str, type[AbstractLoss]] = {loss.__name__: loss for loss in (Absolute, Huber, Squares, StudentT)}
 

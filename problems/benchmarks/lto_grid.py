@@ -27,7 +27,6 @@ import numpy as np
 
 from friction_ocp.estimation.agreement import curve_distance
 from friction_ocp.estimation.estimate import identify
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.estimation.program import Point, Program
@@ -35,6 +34,7 @@ from friction_ocp.estimation.progress import Report
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.kernel import SweepRequest
+from friction_ocp.simulation.losses import Squares
 from friction_ocp.simulation.sweep import Sweep
 
 HERE = Path(__file__).resolve()

@@ -26,7 +26,6 @@ from friction_ocp.drive.parts import Drive, Motor, Shaft
 from friction_ocp.estimation.estimate import Estimate, identify
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.horizon import horizon
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
 from friction_ocp.estimation.program import Point
@@ -36,6 +35,7 @@ from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
 from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.simulation.losses import Squares
 
 TORQUE_CONSTANT, INERTIA, COULOMB, VISCOUS = 0.35, 0.002, 0.1, 1.5e-3
 SLOW_SINE, FREQUENCY, CREEP = 20.0, 0.2, 3.0

@@ -29,11 +29,11 @@ from parameter_box import FloatArray, ParameterBox
 
 from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.simulation.losses import Squares
 from friction_ocp.simulation.sweep import Sweep
 
 FOLDER = Path(__file__).parents[1] / "xl330"

@@ -21,11 +21,11 @@ from blind.site import Site
 from blind.visibility import Excited, View, size_for
 
 import friction_ocp as fo
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.recording.hdf5 import read_recording
+from friction_ocp.simulation.losses import Squares
 
 SEED = 5
 EFFECTS = CATALOGUE | OUTSIDE

@@ -48,7 +48,7 @@ def random_system(
 @settings(deadline=None, max_examples=50)
 @given(
     st.integers(0, 10**6),
-    st.lists(st.integers(1, 6), min_size=1, max_size=3),
+    st.lists(st.integers(1, 13), min_size=1, max_size=3),
     st.integers(1, 3),
     st.integers(1, 4),
     st.sampled_from([0.0, 1e-3, 1.0]),

@@ -42,12 +42,26 @@ def test_released_starts_keep_the_friction_far_above_the_stribeck_speed(stribeck
     """A small Stribeck speed leaves the Coulomb friction as the nested model has it, give or take the share."""
     simple = nested_space(stribeck.problem, stribeck.space)
     starts = released(stribeck, simple, np.array([0.3, 2e-3]))
-    assert len(starts) == 1 + len(RELEASES) * len(SHARES)
+    assert len(starts) == len(RELEASES) * len(SHARES)
     names = stribeck.space.names
-    for start in starts[1 : 1 + len(SHARES)]:
+    for start in starts[: len(SHARES)]:
         values = dict(zip(names, start, strict=True))
         assert values["motor.friction.tau_c"] == pytest.approx(0.3)
         assert values["motor.friction.tau_s"] > values["motor.friction.tau_c"]
+
+
+def test_a_guess_far_from_all_released_starts_is_one_more(stribeck: Model) -> None:
+    """Near them the starts do not depend on the guess; a Stribeck speed that they would never come to is followed."""
+    simple = nested_space(stribeck.problem, stribeck.space)
+    omega_s = stribeck.space.names.index("motor.friction.omega_s")
+    counts: list[int] = []
+    for place in (0.5, 1e-3):
+        guess = stribeck.space.guess.copy()
+        guess[omega_s] = place * stribeck.speeds["motor"].typical
+        moved = replace(stribeck, space=replace(stribeck.space, lower=0.0 * guess).moved(guess))
+        starts = released(moved, simple, np.array([0.3, 2e-3]))
+        counts.append(sum(start[omega_s] == pytest.approx(guess[omega_s]) for start in starts))
+    assert counts == [0, 1]
 
 
 def test_released_breaks_lie_inside_the_speeds_of_the_recording() -> None:

@@ -37,7 +37,7 @@ def summed(density: float, inertia: float) -> np.ndarray:
 def test_torque_noise_makes_the_speed_a_random_walk(model: Model) -> None:
     """The closed form is the sum of independent kicks and what they become in the angle."""
     rounding = np.diag((DETERMINISTIC_GAP * model.state_scale) ** 2)
-    covariance = gap_covariance(model, model.train[0], SPAN) - rounding
+    covariance = gap_covariance(model, model.train[0], np.array([SPAN]))[0] - rounding
     assert covariance == pytest.approx(summed(DENSITY, INERTIA), rel=DISCRETE)
 
 
@@ -49,7 +49,7 @@ def test_weights_make_gaps_white(model: Model) -> None:
     spans = np.diff(item.grid.time[first])[:-1]
     assert len(weights) == len(first) - 2
     for weight, span in zip(weights, spans, strict=True):
-        whitened = weight @ gap_covariance(model, item, float(span)) @ weight.T
+        whitened = weight @ gap_covariance(model, item, np.array([span]))[0] @ weight.T
         assert whitened == pytest.approx(np.eye(2), abs=1e-9)
 
 
@@ -64,6 +64,8 @@ def test_noise_behind_a_rigid_gear_counts_by_its_ratio() -> None:
     """On the first shaft both torque noise and inertia of the second appear divided by the ratio, once and twice."""
     ratio, load = 10.0, 0.3
     geared = prepare(problem(two_masses(None, ratio), process_noise={"motor": DENSITY, "load": 20 * DENSITY}))
-    covariance = gap_covariance(geared, geared.train[0], SPAN) - np.diag((DETERMINISTIC_GAP * geared.state_scale) ** 2)
+    covariance = gap_covariance(geared, geared.train[0], np.array([SPAN]))[0] - np.diag(
+        (DETERMINISTIC_GAP * geared.state_scale) ** 2
+    )
     density = np.hypot(DENSITY, 20 * DENSITY / ratio)
     assert covariance == pytest.approx(summed(density, INERTIA + load / ratio**2), rel=DISCRETE)

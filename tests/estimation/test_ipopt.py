@@ -15,7 +15,6 @@ from smooth_programs import offset_rosenbrock, rosenbrock, toy
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.ipopt import solve_ipopt
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
 from friction_ocp.estimation.program import Point, Program
@@ -25,6 +24,7 @@ from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
 from friction_ocp.recording.recording import Channel as Recorded
 from friction_ocp.recording.recording import Recording
+from friction_ocp.simulation.losses import Squares
 
 AGREEMENT = 1e-6
 """Both solvers stop where less than 1e-7 of the objective is left to gain."""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from friction_ocp.estimation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
+from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 LOSSES = [Squares(), Absolute(0.3), Absolute(3.0), Huber(), Huber(0.5), StudentT(), StudentT(1.5)]
 STEP, TRUNCATION = 1e-5, 1e-6

@@ -11,11 +11,11 @@ from axes import INERTIA, axis, fitted_axis, problem, still_recording
 from hypothesis import given
 from hypothesis import strategies as st
 
-from friction_ocp.estimation.losses import Squares
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import cuts, free_run, mean_error, predictions, relaxed, windows
 from friction_ocp.parameters import Free
+from friction_ocp.simulation.losses import Squares
 
 steps = st.floats(1e-3, 2e-2)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,6 +13,14 @@ from friction_ocp.simulation.grid import FloatArray
 
 class AbstractLoss(ABC):
     """Cost rho(r) of a residual, and rho'(r) / r, its weight in an iteratively reweighted step."""
+
+    code: ClassVar[int]
+    """What native code (`cost_of` in sweep.c) calls it."""
+
+    @property
+    @abstractmethod
+    def parameter(self) -> float:
+        """The number that native code gets with it; 0 where there is none."""
 
     @abstractmethod
     def cost(self, residual: FloatArray) -> FloatArray:
@@ -30,6 +39,12 @@ class AbstractLoss(ABC):
 class Squares(AbstractLoss):
     """Half the square: the likelihood of normal noise."""
 
+    code: ClassVar[int] = 0
+
+    @property
+    def parameter(self) -> float:
+        return 0.0
+
     def cost(self, residual: FloatArray) -> FloatArray:
         return 0.5 * residual**2
 
@@ -45,6 +60,11 @@ class Absolute(AbstractLoss):
     """|r|, rounded below `rounding`: the likelihood of Laplace noise."""
 
     rounding: float
+    code: ClassVar[int] = 1
+
+    @property
+    def parameter(self) -> float:
+        return self.rounding
 
     def cost(self, residual: FloatArray) -> FloatArray:
         return np.sqrt(residual**2 + self.rounding**2) - self.rounding
@@ -61,6 +81,11 @@ class Huber(AbstractLoss):
     """Square near zero, linear beyond `knee` noise floors. Source: Huber 1964."""
 
     knee: float = 1.345
+    code: ClassVar[int] = 2
+
+    @property
+    def parameter(self) -> float:
+        return self.knee
 
     def cost(self, residual: FloatArray) -> FloatArray:
         size = np.abs(residual)
@@ -78,6 +103,11 @@ class StudentT(AbstractLoss):
     """Negative log-likelihood of Student's t noise. Source: Lange, Little, Taylor 1989."""
 
     freedom: float = 4.0
+    code: ClassVar[int] = 3
+
+    @property
+    def parameter(self) -> float:
+        return self.freedom
 
     def cost(self, residual: FloatArray) -> FloatArray:
         return 0.5 * (self.freedom + 1.0) * np.log1p(residual**2 / self.freedom)
