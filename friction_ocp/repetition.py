@@ -175,7 +175,7 @@ def _simulate(problems: Sequence[Problem], made: Json, folder: Path, execution: 
 
 
 def _diagnose(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
-    save_diagnosis(diagnose(problems[0]), folder)
+    save_diagnosis(diagnose(problems[0], execution=execution), folder)
 
 
 def _multistart(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:

@@ -8,7 +8,7 @@ import sys
 import time
 from typing import Any
 
-from friction_ocp.cli.options import DONE, add_job, checked, output_folder
+from friction_ocp.cli.options import DONE, add_job, add_workers, checked, executor, output_folder
 
 SECONDS_BETWEEN_LINES = 2.0
 
@@ -16,15 +16,22 @@ SECONDS_BETWEEN_LINES = 2.0
 def add_commands(commands: Any) -> None:
     """Add `diagnose` to the parser."""
     add_job(commands, "diagnose", "where the gap lies, what causes it, how far it shrinks", _diagnose)
+    add_workers(commands.choices["diagnose"])
 
 
 def _diagnose(options: argparse.Namespace) -> int:
     from friction_ocp.diagnosis.diagnose import diagnose
     from friction_ocp.diagnosis_folder import save_diagnosis
     from friction_ocp.report.diagnosis_words import diagnosis_summary
+    from friction_ocp.statistics.execution import Execution
 
-    folder = output_folder(options)
-    save_diagnosis(diagnose(checked(options), _Lines()), folder)
+    folder, problem = output_folder(options), checked(options)
+    try:
+        diagnosis = diagnose(problem, _Lines(), Execution(executor(options), folder))
+    except KeyboardInterrupt:
+        print(f"diagnose: what has ended is in {folder / 'tasks'}; the same command goes on", file=sys.stderr)
+        raise
+    save_diagnosis(diagnosis, folder)
     text = (folder / "result.json").read_text(encoding="utf-8")
     if options.json:
         print(text)

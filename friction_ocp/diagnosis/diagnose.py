@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.bench import Crew, Tell, blocks_like, open_bench
+from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess, excess
-from friction_ocp.diagnosis.fitting import (
-    FittedModel,
-    completed,
-    farther,
-    fit_base,
-    held_out,
-    quick_refit,
-    without_addition,
-)
+from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
-from friction_ocp.diagnosis.screen import Screened, screen
+from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.statistics.execution import Execution
 
 SIGNIFICANCE = 0.01
 MOST_ROUNDS = 4
@@ -46,8 +39,6 @@ free runs, whose fits end late, all."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 
-Tell = Callable[[str, float], None]
-"""Called with what is being done and the share of a round that is done."""
 Key = tuple[str, str]
 
 
@@ -118,22 +109,38 @@ class Diagnosis:
         return "undecided" if self.alias_sets else "explained"
 
 
-def diagnose(problem: Problem, tell: Tell = lambda what, share: None) -> Diagnosis:
-    """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive."""
+def diagnose(
+    problem: Problem, tell: Tell = lambda what, share: None, execution: Execution = Execution(InProcess())
+) -> Diagnosis:
+    """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive.
+
+    The base fit, score tests and refits of a round are tasks: in whatever process, with the same numbers, and taken
+    from the output folder where an earlier run ended them.
+    """
     began = time.perf_counter()
     level, names = _options(problem)
     tell("base model", 0.0)
-    base = fit_base(prepare(problem))
+    bench = open_bench(problem, execution)
+    base = bench.base
     rng = np.random.default_rng(problem.estimation.seed)
-    current, rounds, accepted = base, list[Round](), list[Key]()
-    for number in range(MOST_ROUNDS):
-        done = _round(current, names, level, rng, lambda what, share, n=number: tell(f"round {n + 1}: {what}", share))
-        rounds.append(done)
-        if done.accepted is None:
-            break
-        current = done.accepted.fitted
-        tell("examining earlier additions again", 0.0)
-        current, accepted = _reexamined(base, current, [*accepted, done.accepted.key], level, rng)
+    rounds, accepted = list[Round](), list[Key]()
+    with execution.executor.kept() as executor:
+        for number in range(1, MOST_ROUNDS + 1):
+            crew = Crew(
+                bench,
+                replace(execution, executor=executor),
+                number,
+                lambda what, share, n=number: tell(f"round {n}: {what}", share),
+            )
+            done = _round(crew, names, level, rng)
+            rounds.append(done)
+            if done.accepted is None:
+                break
+            tell("examining earlier additions again", 0.0)
+            keys = [*accepted, done.accepted.key]
+            current, accepted = _reexamined(base, done.accepted.fitted, keys, level, rng)
+            bench = bench.at(current)
+    current = bench.current
     rows = current.linear.rows
     return Diagnosis(
         problem=problem,
@@ -196,20 +203,13 @@ def _options(problem: Problem) -> tuple[float, list[str]]:
     return float(level), [str(name) for name in wanted if name not in left_out]
 
 
-def _round(current: FittedModel, names: list[str], level: float, rng: np.random.Generator, tell: Tell) -> Round:
-    rows = current.linear.rows
-    blocks, clues = blocks_of(rows), clues_of(current)
-    entries = list(candidates(current.model.problem.drive, names))
-    found: list[Screened] = []
-    for k, (effect, place) in enumerate(entries):
-        tell(f"{effect.name} at {place}", 0.5 * k / len(entries))
-        seen = screen(current.model, current.linear, blocks, effect, place, clues)
-        found += [] if seen is None else [seen]
-    found.sort(key=lambda item: -item.gain)
-    power = excess(rows, blocks)
+def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator) -> Round:
+    current, blocks = crew.bench.current, crew.bench.blocks
+    places = [(effect.name, place) for effect, place in candidates(current.model.problem.drive, names)]
+    found = crew.screened(places)
+    power = excess(current.linear.rows, blocks)
     shortlist = _shortlist(found, level, power.significant(level))
-    rivals = _rivals(current, shortlist, blocks, tell)
-    choice = choose(rivals, blocks, level, rng)
+    choice = choose(_rivals(crew, shortlist), blocks, level, rng)
     accepted = choice.rivals[0] if choice.significant and _is_material(current, choice.rivals[0].fitted) else None
     return Round(tuple(found), choice, current, power, accepted)
 
@@ -227,39 +227,18 @@ def _shortlist(found: Sequence[Screened], level: float, gap: bool) -> list[Scree
     return [item for item in significant if item.gain >= WORTH_REFITTING * significant[0].gain][:REFITTED]
 
 
-def _rivals(current: FittedModel, shortlist: Sequence[Screened], blocks: Blocks, tell: Tell) -> list[Rival]:
+def _rivals(crew: Crew, shortlist: Sequence[Screened]) -> list[Rival]:
     if not shortlist:
         return []
-    without = blocks.sums(held_out(current))
-    tried: list[tuple[Screened, FittedModel]] = []
-    for k, item in enumerate(shortlist):
-        tell(f"refit with {item.effect} at {item.component}", 0.5 + 0.5 * k / len(shortlist))
-        starts = list(item.starts)
-        if current.footing.segment_s is None:
-            starts.append(farther(item.values, item.augmentation))
-        tried.append((item, quick_refit(current, item.augmentation.drive, starts)))
-    tried.sort(key=lambda pair: pair[1].objective)
-    rivals: list[Rival] = []
-    for k, (item, quick) in enumerate(tried):
-        if k < FINISHED or current.footing.segment_s is None or quick.objective < CLOSE * tried[0][1].objective:
-            fitted = completed(quick)
-            rivals.append(Rival(item, fitted, without - blocks_like(current, fitted, blocks)))
-    return rivals
-
-
-def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> FloatArray:
-    """Return (blocks,) held-out costs of a refitted candidate over the blocks of the model without it."""
-    rows, reference = fitted.linear.rows, current.linear.rows
-    costs = held_out(fitted)
-    totals = np.zeros(blocks.count)
-    for recording in np.unique(blocks.recording):
-        own = (reference.recording == recording) & (blocks.of_row >= 0)
-        numbers, starts = blocks.of_row[own], reference.time[own]
-        mine = rows.recording == recording
-        order = np.argsort(starts, kind="stable")
-        at = np.clip(np.searchsorted(starts[order], rows.time[mine], side="right") - 1, 0, order.size - 1)
-        np.add.at(totals, numbers[order][at], costs[mine])
-    return totals
+    without, refits = crew.without(shortlist)
+    tried = sorted(zip(shortlist, refits, strict=True), key=lambda pair: pair[1].objective)
+    free_run = crew.bench.current.footing.segment_s is None
+    kept = [
+        pair
+        for k, pair in enumerate(tried)
+        if k < FINISHED or free_run or pair[1].objective < CLOSE * tried[0][1].objective
+    ]
+    return crew.rivals(kept, without)
 
 
 def _is_material(current: FittedModel, fitted: FittedModel) -> bool:

@@ -103,10 +103,14 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     return found
 
 
+def training_pieces(model: Model) -> tuple[Experiment, ...]:
+    """Return the training recordings, or pieces of the only one."""
+    return model.train if len(model.train) > 1 else tuple(pieces(model.train[0], FOLDS))
+
+
 def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:
     """Return the common footing of all models, from the base model at `theta`; `loss` is that of free runs."""
-    first = model.train[0]
-    train = model.train if len(model.train) > 1 else tuple(pieces(first, FOLDS))
+    first, train = model.train[0], training_pieces(model)
     numbers = {
         use.name: dict(zip(model.space.leaf_names, model.space.numbers(theta, use.name), strict=True))
         for use in model.problem.recordings

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from friction_ocp.execution.task import Outcome, Task, attempt
@@ -18,6 +19,11 @@ class AbstractExecutor(ABC):
 
         Closing the iterator stops whatever still runs.
         """
+
+    @contextmanager
+    def kept(self) -> Generator[AbstractExecutor]:
+        """Keep what is costly to start for several runs within."""
+        yield self
 
 
 class InProcess(AbstractExecutor):

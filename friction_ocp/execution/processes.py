@@ -35,11 +35,14 @@ class Processes(AbstractExecutor):
     workers: int = 2
 
     def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
-        team = _Team(pickle.dumps(shared), list(tasks))
+        with self.kept() as kept:
+            yield from kept.run(tasks, shared)
+
+    @contextmanager
+    def kept(self) -> Generator[AbstractExecutor]:
+        team = _Team(self.workers)
         try:
-            team.hire(min(self.workers, len(tasks)))
-            while team.busy:
-                yield from team.listen()
+            yield team
         finally:
             team.dismiss()
 
@@ -50,30 +53,46 @@ class _Worker:
     connection: Connection
     ready: bool = False
     task: Task | None = None
+    run: int = 0
+    """The run whose shared argument it has."""
 
 
-class _Team:
-    """Workers, what each is doing, and what is left to do."""
+class _Team(AbstractExecutor):
+    """Workers, what each is doing, and what is left to do; they stay from one run to the next."""
 
-    def __init__(self, shared: bytes, tasks: list[Task]) -> None:
-        self._shared, self._waiting = shared, tasks[::-1]
+    def __init__(self, size: int) -> None:
+        self._size, self._run = size, 0
+        self._shared: bytes = b""
+        self._waiting: list[Task] = []
         self._workers: list[_Worker] = []
 
-    @property
-    def busy(self) -> bool:
-        return bool(self._workers)
+    def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
+        self._run += 1
+        self._shared, self._waiting = pickle.dumps(shared), list(tasks)[::-1]
+        left = len(tasks)
+        try:
+            self._hire(min(self._size, left) - len(self._workers))
+            for worker in self._workers.copy():
+                self._hand_out(worker)
+            while left:
+                for outcome in self._listen():
+                    left -= 1
+                    yield outcome
+        finally:
+            if left:  # what still runs is of no use to the next run
+                self.dismiss()
 
-    def hire(self, count: int) -> None:
+    def _hire(self, count: int) -> None:
         context = multiprocessing.get_context("spawn")
         with _environment(ONE_THREAD):
             for _ in range(count):
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(theirs, self._shared), daemon=True)
+                process = context.Process(target=_serve, args=(theirs,), daemon=True)
                 process.start()
                 theirs.close()
                 self._workers.append(_Worker(process, ours))
 
-    def listen(self) -> list[Outcome]:
+    def _listen(self) -> list[Outcome]:
         """Wait for any worker to speak or die; hand out the next tasks and return what has ended."""
         speaking = wait([worker.connection for worker in self._workers])
         heard = [self._hear(worker) for worker in self._workers.copy() if worker.connection in speaking]
@@ -85,12 +104,20 @@ class _Team:
         except (EOFError, OSError):
             return self._bury(worker)
         worker.ready, worker.task = True, None
-        if not self._waiting:
-            self._release(worker)
-        else:
-            worker.task = self._waiting.pop()
-            worker.connection.send_bytes(pickle.dumps(worker.task))
+        self._hand_out(worker)
         return outcome
+
+    def _hand_out(self, worker: _Worker) -> None:
+        """Give the next task to a worker that is idle, with the shared argument where it has that of another run."""
+        if not worker.ready or worker.task is not None or not self._waiting:
+            return
+        task = self._waiting.pop()
+        try:
+            worker.connection.send_bytes(pickle.dumps((self._shared if worker.run != self._run else None, task)))
+        except OSError:  # it died while it was idle: whoever takes its place takes the task
+            self._waiting.append(task)
+            return
+        worker.task, worker.run = task, self._run
 
     def _bury(self, worker: _Worker) -> Outcome | None:
         """Replace a worker that died; its task is lost."""
@@ -102,7 +129,7 @@ class _Team:
             remedy = "a script that calls this needs `if __name__ == '__main__':`; or run with one worker"
             raise FrictionOcpError(Finding("execution", what, remedy=remedy))
         if self._waiting:
-            self.hire(1)
+            self._hire(1)
         if worker.task is None:
             return None
         return Outcome(worker.task.key, error=f"its process ended with code {code}", lost=True)
@@ -112,6 +139,7 @@ class _Team:
         self._workers.remove(worker)
 
     def dismiss(self) -> None:
+        """Let all workers go."""
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers.copy():
@@ -135,18 +163,20 @@ def _environment(changes: dict[str, str]) -> Generator[None]:
                 os.environ[name] = value
 
 
-def _serve(connection: Connection, packed: bytes) -> None:
+def _serve(connection: Connection) -> None:
     """Work on tasks until the other end closes; Ctrl-C is for the parent to answer."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    shared = pickle.loads(packed)
+    shared: Any = None
     connection.send(None)
     while True:
         try:
             content = connection.recv_bytes()
         except (EOFError, OSError):
             return
-        connection.send(attempt(pickle.loads(content), shared))
+        packed, task = pickle.loads(content)
+        shared = shared if packed is None else pickle.loads(packed)
+        connection.send(attempt(task, shared))
 
 
 def _end_with_parent() -> None:

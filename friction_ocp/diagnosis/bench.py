@@ -1,0 +1,268 @@
+"""Where the candidates of a round are worked on: tasks that need nothing of one another, on disk when they end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.fitting import (
+    FittedModel,
+    completed,
+    farther,
+    fit_base,
+    held_out,
+    quick_refit,
+)
+from friction_ocp.diagnosis.footing import Footing, training_pieces
+from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.screen import Screened, screen
+from friction_ocp.diagnosis.select import Rival
+from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import Augmentation, Clues
+from friction_ocp.effects.registry import effects
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.losses import Absolute, Huber, Squares, StudentT
+from friction_ocp.estimation.model import Model, prepare, with_drive
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.program import Point
+from friction_ocp.execution.content import fingerprint
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.execution.plain import plain, restored
+from friction_ocp.execution.run import Tally, run_tasks
+from friction_ocp.execution.task import Json, Outcome, Task
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.statistics.execution import Execution
+from friction_ocp.statistics.workshop import Workshop
+
+Tell = Callable[[str, float], None]
+"""Called with what is being done and the share of a round that is done."""
+LOSSES = (Absolute, Huber, Squares, StudentT)
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a fit stands, as a file can hold it: all that it takes to linearise it again, in any process."""
+
+    drive: Drive
+    point: Json
+
+    @classmethod
+    def of(cls, fitted: FittedModel) -> Seat:
+        """Take down where a fit stands."""
+        return cls(fitted.model.problem.drive, point_document(fitted))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What the tasks of a round share: the problem, the base model's end and that of the current model."""
+
+    problem: Problem
+    footing: Json
+    base_point: Json
+    seat: Seat
+
+    @cached_property
+    def base(self) -> FittedModel:
+        """The base model on its footing."""
+        model = prepare(self.problem)
+        train = restored_footing(self.footing, model)
+        return seated(model, train, self.base_point)
+
+    @cached_property
+    def current(self) -> FittedModel:
+        """The model of this round."""
+        base = self.base
+        if self.seat.point is self.base_point or self.seat.point == self.base_point:
+            return base
+        return seated(with_drive(base.model, self.seat.drive), base.footing, self.seat.point)
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """Blocks of the residuals of the current model."""
+        return blocks_of(self.current.linear.rows)
+
+    @cached_property
+    def clues(self) -> Clues:
+        """What the current model says about sizes."""
+        return clues_of(self.current)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of all that decides a number of this round."""
+        ends = json.dumps([self.footing, self.base_point, self.seat.point])
+        return fingerprint(Workshop(self.problem).fingerprint, ends, self.seat.drive)
+
+    def at(self, fitted: FittedModel) -> Bench:
+        """Return the bench of the next round, with what is built already."""
+        moved = Bench(self.problem, self.footing, self.base_point, Seat.of(fitted))
+        moved.__dict__["base"] = self.base
+        return moved
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave behind what is built: model functions belong to their process."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+
+def point_document(fitted: FittedModel) -> Json:
+    """Return parameters and node states."""
+    point = fitted.linear.point
+    return plain({"theta": point.theta, "nodes": point.nodes})
+
+
+def seated(model: Model, foot: Footing, content: Json) -> FittedModel:
+    """Return a fit where `point_document` says that it stands."""
+    return FittedModel(model, foot, linear_program(foot.training(model), Point(**restored(content))))
+
+
+def footing_document(foot: Footing) -> Json:
+    """Return all of a footing but the recordings."""
+    return plain({item.name: getattr(foot, item.name) for item in fields(foot) if item.name != "train"})
+
+
+def restored_footing(content: Json, model: Model) -> Footing:
+    """Return the footing with the recordings of the base model."""
+    return Footing(**restored(content, LOSSES), train=training_pieces(model))
+
+
+def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> FloatArray:
+    """Return (blocks,) held-out costs of a refitted candidate over the blocks of the model without it."""
+    rows, reference = fitted.linear.rows, current.linear.rows
+    costs = held_out(fitted)
+    totals = np.zeros(blocks.count)
+    for recording in np.unique(blocks.recording):
+        own = (reference.recording == recording) & (blocks.of_row >= 0)
+        numbers, starts = blocks.of_row[own], reference.time[own]
+        mine = rows.recording == recording
+        order = np.argsort(starts, kind="stable")
+        at = np.clip(np.searchsorted(starts[order], rows.time[mine], side="right") - 1, 0, order.size - 1)
+        np.add.at(totals, numbers[order][at], costs[mine])
+    return totals
+
+
+def open_bench(problem: Problem, execution: Execution) -> Bench:
+    """Fit the base model in this process, or read its end from the output folder."""
+    workshop, task = Workshop(problem), Task("base", fit_base_model)
+    with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
+    found = _value(with_one["base"])
+    return Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+
+
+def fit_base_model(workshop: Workshop) -> Json:
+    """Fit the base model from its guesses; the value says where it stands."""
+    fitted = fit_base(prepare(workshop.problem))
+    return {"footing": footing_document(fitted.footing), "point": point_document(fitted)}
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Hands out the work of one round and takes what comes back."""
+
+    bench: Bench
+    execution: Execution
+    number: int
+    tell: Tell
+
+    def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+        """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
+        tasks = [self._task("screen", key, screen_candidate, key) for key in candidates]
+        values = self._run("screening", tasks, 0.0)
+        found = [self._screened(value) for value in values if value is not None]
+        return sorted(found, key=lambda item: -item.gain)
+
+    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[FittedModel]]:
+        """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps."""
+        tasks = [Task(f"{self.number}-held-out", held_out_costs)]
+        tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
+        costs, *points = self._run("refits", tasks, 0.5)
+        pairs = zip(shortlist, points, strict=True)
+        return restored(costs), [seat_candidate(self.bench, item, point) for item, point in pairs]
+
+    def rivals(self, tried: Sequence[tuple[Screened, FittedModel]], without: FloatArray) -> list[Rival]:
+        """Return candidates whose refits are completed, with what they gain on recordings left out."""
+        tasks = [
+            self._task("complete", item.key, complete_candidate, (screened_document(item), point_document(quick)))
+            for item, quick in tried
+        ]
+        values = self._run("completing refits", tasks, 0.75)
+        return [
+            Rival(item, seat_candidate(self.bench, item, value["point"]), without - restored(value["costs"]))
+            for (item, _), value in zip(tried, values, strict=True)
+        ]
+
+    def _task(self, what: str, key: tuple[str, str], function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
+        return Task(f"{self.number}-{what}-{key[0]}-{key[1]}", function, arguments)
+
+    def _run(self, what: str, tasks: Sequence[Task], begin: float) -> list[Json]:
+        def watch(tally: Tally) -> None:
+            self.tell(f"{what}: {tally.done} of {tally.total}", begin + 0.25 * tally.done / max(tally.total, 1))
+
+        bench, run = self.bench, self.execution
+        outcomes = run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch)
+        return [_value(outcome) for outcome in outcomes.values()]
+
+    def _screened(self, content: Json) -> Screened:
+        return restored_screened(self.bench, content)
+
+
+def _value(outcome: Outcome) -> Json:
+    if outcome.error:
+        remedy = "run the same command again: it goes on from there" if outcome.lost else ""
+        raise FrictionOcpError(Finding(f"diagnose: {outcome.key}", outcome.error, remedy=remedy))
+    return outcome.value
+
+
+def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
+    """Test an effect at a place; null where the drive with it cannot be simulated."""
+    current = bench.current
+    seen = screen(current.model, current.linear, bench.blocks, effects()[effect], place, bench.clues)
+    return None if seen is None else screened_document(seen)
+
+
+def held_out_costs(bench: Bench) -> Json:
+    """Return (blocks,) costs of the current model on recordings left out."""
+    return plain(bench.blocks.sums(held_out(bench.current)))
+
+
+def refit_candidate(bench: Bench, content: Json) -> Json:
+    """Refit a candidate, a few steps."""
+    return point_document(quick_candidate(bench.current, restored_screened(bench, content)))
+
+
+def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
+    """Refit a candidate from there to its end, and cost it on recordings left out."""
+    quick = seat_candidate(bench, restored_screened(bench, content), point)
+    fitted = completed(quick)
+    return {"point": point_document(fitted), "costs": plain(blocks_like(bench.current, fitted, bench.blocks))}
+
+
+def quick_candidate(current: FittedModel, item: Screened) -> FittedModel:
+    """Fit a few steps from each predicted start; of free runs from farther ones, too."""
+    starts = list(item.starts)
+    if current.footing.segment_s is None:
+        starts.append(farther(item.values, item.augmentation))
+    return quick_refit(current, item.augmentation.drive, starts)
+
+
+def seat_candidate(bench: Bench, item: Screened, point: Json) -> FittedModel:
+    """Return the refit of a candidate where it stands."""
+    return seated(with_drive(bench.current.model, item.augmentation.drive), bench.current.footing, point)
+
+
+def screened_document(item: Screened) -> Json:
+    """Return a score test without its drive, which effect and place bring back."""
+    return plain({part.name: getattr(item, part.name) for part in fields(item) if part.name != "augmentation"})
+
+
+def restored_screened(bench: Bench, content: Json) -> Screened:
+    """Return the score test with its drive."""
+    found: Mapping[str, Any] = restored(content)
+    drive = bench.current.model.problem.drive
+    augmentation: Augmentation = effects()[found["effect"]].augment(drive, found["component"], bench.clues)
+    return Screened(**found, augmentation=augmentation)
