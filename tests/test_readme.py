@@ -59,6 +59,14 @@ def test_ci_runs_the_test_command_as_it_stands() -> None:
     assert blocks("sh")[1].strip() in script
 
 
+def test_the_cluster_needs_three_commands_that_exist() -> None:
+    """Scheduler, workers, and a command with the option that hands its tasks to them."""
+    scheduler, workers, command = blocks("console")[0].splitlines()
+    assert scheduler.startswith("dask scheduler --host 127.0.0.1") and workers.startswith("dask worker 127.0.0.1:")
+    options = _parser().parse_args(command.split()[1:])
+    assert options.scheduler == workers.split()[2] and options.problem.exists()
+
+
 def test_the_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """The code in the README fits the servo with one parameter more and prints them all."""
     example = blocks("python")[0]

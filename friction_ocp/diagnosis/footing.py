@@ -105,7 +105,8 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
 
 def training_pieces(model: Model) -> tuple[Experiment, ...]:
     """Return the training recordings, or pieces of the only one."""
-    return model.train if len(model.train) > 1 else tuple(pieces(model.train[0], FOLDS))
+    first, *others = model.train
+    return model.train if others else tuple(pieces(first, FOLDS))
 
 
 def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:

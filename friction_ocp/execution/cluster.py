@@ -45,7 +45,7 @@ class Cluster(AbstractExecutor):
                 ): task
                 for index, task in enumerate(tasks)
             }
-            for future in distributed.as_completed(list(futures)):
+            for future in distributed.as_completed(list(futures), loop=client.loop):
                 yield _outcome(future, futures[future])
         finally:
             client.close(PATIENCE)
