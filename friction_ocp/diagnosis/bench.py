@@ -28,7 +28,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.losses import Absolute, Huber, Squares, StudentT
+from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
 from friction_ocp.estimation.model import Model, prepare, with_drive
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point

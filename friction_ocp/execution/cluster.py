@@ -46,7 +46,9 @@ class Cluster(AbstractExecutor):
                 for index, task in enumerate(tasks)
             }
             for future in distributed.as_completed(list(futures), loop=client.loop):
-                yield _outcome(future, futures[future])
+                outcome = _outcome(future, futures.pop(future))
+                future.release()  # else the cluster would do it again once the worker that holds its value is lost
+                yield outcome
         finally:
             client.close(PATIENCE)
 

@@ -32,9 +32,9 @@ def clusters(line: str, quick: bool) -> Check:
         "no:cacheprovider",
         "tests/execution/test_cluster.py",
     ]
-    tests = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    last = (tests.stdout.strip().splitlines() or ["no output"])[-1]
-    return Check(line, f"{last}\n{sooner.measured}", bool(tests.returncode == 0 and sooner.passed))
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    last = (run.stdout.strip().splitlines() or ["no output"])[-1]
+    return Check(line, f"{last}\n{sooner.measured}", bool(run.returncode == 0 and sooner.passed))
 
 
 def kills_and_resumes(line: str, quick: bool) -> Check:

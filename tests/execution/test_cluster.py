@@ -100,7 +100,6 @@ def test_every_task_has_an_outcome(workers: Workers, tmp_path: Path) -> None:
 def test_a_lost_worker_costs_its_task_only(workers: Workers, tmp_path: Path) -> None:
     """What it worked on is done again by the other one; nothing that had come back is."""
     tasks = [Task(f"t{k}", slowly_noted, (f"t{k}", 0.3)) for k in range(8)]
-
     back: list[str] = []
 
     def watch(tally: Tally) -> None:
