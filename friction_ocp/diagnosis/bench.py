@@ -28,7 +28,6 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
 from friction_ocp.estimation.model import Model, prepare, with_drive
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
@@ -38,6 +37,7 @@ from friction_ocp.execution.plain import plain, restored
 from friction_ocp.execution.run import Tally, run_tasks
 from friction_ocp.execution.task import Json, Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.workshop import Workshop
 

@@ -21,17 +21,8 @@ def batches(line: str, quick: bool) -> Check:
 def clusters(line: str, quick: bool) -> Check:
     """Run the tests with a real scheduler, and time a diagnosis in one process and in two."""
     sooner = jobs.check(line, 4.0 if quick else jobs.SECONDS)
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        "tests/execution/test_cluster.py",
-    ]
+    test = "tests/execution/test_cluster.py"
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", test]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     last = (run.stdout.strip().splitlines() or ["no output"])[-1]
     return Check(line, f"{last}\n{sooner.measured}", bool(run.returncode == 0 and sooner.passed))
