@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.design.next_experiment import FollowUp
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
-from friction_ocp.diagnosis.next_experiment import next_experiment
 from friction_ocp.diagnosis.select import Rival, probabilities
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
@@ -25,8 +25,8 @@ from friction_ocp.result_document import heading, provenance
 FORMAT = "friction-ocp-diagnosis/1"
 
 
-def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the content of result.json for a diagnosis."""
+def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) -> dict[str, Any]:
+    """Return the content of result.json for a diagnosis and what to record after it."""
     problem = diagnosis.problem
     return {
         "format": FORMAT,
@@ -36,11 +36,12 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": _where(diagnosis),
         "rounds": [_round(diagnosis, item) for item in diagnosis.rounds],
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
+        "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
         "accepted": [{**_named(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
         "remainder": _remainder(diagnosis),
         "gap": _gap(diagnosis),
         "biased_parameters": [_bias(item) for item in biased_parameters(diagnosis.base, diagnosis.final)],
-        "next_experiment": next_experiment(diagnosis),
+        "next_experiment": None if following is None else _next_experiment(following),
         "significance": diagnosis.level,
         "assumptions": _assumptions(diagnosis),
         "seconds": diagnosis.seconds,
@@ -51,6 +52,22 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _named(key: Key) -> dict[str, str]:
     return {"effect": key[0], "component": key[1]}
+
+
+def _next_experiment(following: FollowUp) -> dict[str, Any]:
+    option = following.option
+    if option is None:
+        return {"text": following.text, "separates": [_named(key) for key in following.rivals], "recording": None}
+    return {
+        "text": following.text,
+        "separates": [_named(key) for key in following.rivals],
+        "recording": "next_experiment.h5",
+        "motion": option.run.motion.name,
+        "amplitude": option.run.amplitude,
+        "power": option.power,
+        "separation": option.worth,
+        "peaks": dict(option.run.peaks),
+    }
 
 
 def _units(diagnosis: Diagnosis) -> dict[str, str]:

@@ -1,10 +1,11 @@
-"""A diagnosis on disk: result.json, result.h5, base.yaml and augmented.yaml, report.html, figures."""
+"""A diagnosis on disk: result.json, result.h5, base.yaml and augmented.yaml, report.html, figures, and the next run."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+from friction_ocp.design.next_experiment import follow_up
 from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis_document import diagnosis_document
@@ -20,11 +21,12 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
     from friction_ocp.plots.figures import file_stem
     from friction_ocp.plots.style import figure_style, save
     from friction_ocp.problem_file.write import write_problem
-    from friction_ocp.recording.hdf5 import write_result_series
+    from friction_ocp.recording.hdf5 import write_recording, write_result_series
     from friction_ocp.report.diagnosis_page import write_diagnosis_report
 
     target = Path(folder)
-    document = diagnosis_document(diagnosis)
+    following = follow_up(diagnosis)
+    document = diagnosis_document(diagnosis, following)
     target.mkdir(parents=True, exist_ok=True)
     before, after = (_series(diagnosis, errors) for errors in (diagnosis.before, diagnosis.after))
     write_text(target / "result.json", json.dumps(document, indent=1, allow_nan=False))
@@ -34,6 +36,8 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
         for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
             text = write_problem(path, fitted.model.problem.drive, fitted.values, target, fitted.model.max_step)
             write_text(target / name, text)
+    if following is not None and following.option is not None:
+        write_recording(following.option.run.recording, target / "next_experiment.h5")
     pictures: dict[str, Path] = {}
     taken: set[str] = set()
     (target / "figures").mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""`diagnose`."""
+"""`diagnose`, and `design` for what to record."""
 
 from __future__ import annotations
 
@@ -17,6 +17,12 @@ def add_commands(commands: Any) -> None:
     """Add `diagnose` to the parser."""
     add_job(commands, "diagnose", "where the gap lies, what causes it, how far it shrinks", _diagnose)
     add_workers(commands.choices["diagnose"])
+    add_job(commands, "design", "a motion within limits that separates candidates or sharpens parameters", _design)
+    job = commands.choices["design"]
+    text = "D: least volume of the confidence region; A: least mean squared relative standard error"
+    job.add_argument("--criterion", choices=["D", "A"], default="D", help=text)
+    text = "candidates to tell apart, such as stribeck@motor; without them parameters are sharpened"
+    job.add_argument("--between", nargs="+", default=[], metavar="EFFECT@PLACE", help=text)
 
 
 def _diagnose(options: argparse.Namespace) -> int:
@@ -39,6 +45,28 @@ def _diagnose(options: argparse.Namespace) -> int:
         print(diagnosis_summary(json.loads(text)))
         print(f"Report: {folder / 'report.html'}")
     return DONE
+
+
+def _design(options: argparse.Namespace) -> int:
+    from friction_ocp.design.design import designed
+    from friction_ocp.design_folder import save_design
+    from friction_ocp.report.design_words import design_summary
+
+    folder, between = output_folder(options), [_pair(text) for text in options.between]
+    design = designed(checked(options), options.criterion, between, _Lines())
+    save_design(design, between, folder)
+    text = (folder / "result.json").read_text(encoding="utf-8")
+    if options.json:
+        print(text)
+    else:
+        print(design_summary(json.loads(text)))
+        print(f"Report: {folder / 'report.html'}")
+    return DONE
+
+
+def _pair(text: str) -> tuple[str, str]:
+    effect, _, place = text.partition("@")
+    return effect, place
 
 
 class _Lines:

@@ -15,17 +15,16 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import (
     FittedModel,
     completed,
-    farther,
     fit_base,
     held_out,
     quick_refit,
 )
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.screen import Screened, screen
+from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.select import Rival
 from friction_ocp.drive.parts import Drive
-from friction_ocp.effects.effect import Augmentation, Clues
+from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import Model, prepare, with_drive
@@ -232,7 +231,7 @@ def held_out_costs(bench: Bench) -> Json:
 
 def refit_candidate(bench: Bench, content: Json) -> Json:
     """Refit a candidate, a few steps."""
-    return point_document(quick_candidate(bench.current, restored_screened(bench, content)))
+    return point_document(quick_refit(bench.current, restored_screened(bench, content)))
 
 
 def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
@@ -240,14 +239,6 @@ def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
     quick = seat_candidate(bench, restored_screened(bench, content), point)
     fitted = completed(quick)
     return {"point": point_document(fitted), "costs": plain(blocks_like(bench.current, fitted, bench.blocks))}
-
-
-def quick_candidate(current: FittedModel, item: Screened) -> FittedModel:
-    """Fit a few steps from each predicted start; of free runs from farther ones, too."""
-    starts = list(item.starts)
-    if current.footing.segment_s is None:
-        starts.append(farther(item.values, item.augmentation))
-    return quick_refit(current, item.augmentation.drive, starts)
 
 
 def seat_candidate(bench: Bench, item: Screened, point: Json) -> FittedModel:
@@ -262,7 +253,7 @@ def screened_document(item: Screened) -> Json:
 
 def restored_screened(bench: Bench, content: Json) -> Screened:
     """Return the score test with its drive."""
-    found: Mapping[str, Any] = restored(content)
+    found: Mapping[str, Any] = restored(content, (Start, Trial))
     drive = bench.current.model.problem.drive
     augmentation: Augmentation = effects()[found["effect"]].augment(drive, found["component"], bench.clues)
     return Screened(**found, augmentation=augmentation)

@@ -16,7 +16,7 @@ from friction_ocp.diagnosis.excess import Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples
+from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
@@ -34,8 +34,8 @@ REFITTED = 6
 WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
 FINISHED, CLOSE = 2, 1.5
-"""Candidates whose refit is completed: the best after a few steps, and all whose objective is within this factor; of
-free runs, whose fits end late, all."""
+"""Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
+this factor; of free runs, whose fits end late, all."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 
@@ -96,7 +96,14 @@ class Diagnosis:
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
         """Sets of candidates that the recordings cannot tell apart."""
         decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
-        sets = [tuple(rival.key for rival in item.choice.aliases) for item in decided]
+        sets = [tuple(rival.key for rival in shown(item.choice.aliases)) for item in decided]
+        return tuple(keys for keys in sets if len(keys) > 1)
+
+    @property
+    def same(self) -> tuple[tuple[Key, ...], ...]:
+        """Sets of what is one and the same in these recordings, the accepted effect first."""
+        decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
+        sets = [tuple(rival.key for rival in item.choice.same) for item in decided]
         return tuple(keys for keys in sets if len(keys) > 1)
 
     @property
@@ -231,13 +238,15 @@ def _rivals(crew: Crew, shortlist: Sequence[Screened]) -> list[Rival]:
     if not shortlist:
         return []
     without, refits = crew.without(shortlist)
-    tried = sorted(zip(shortlist, refits, strict=True), key=lambda pair: pair[1].objective)
-    free_run = crew.bench.current.footing.segment_s is None
-    kept = [
-        pair
-        for k, pair in enumerate(tried)
-        if k < FINISHED or free_run or pair[1].objective < CLOSE * tried[0][1].objective
+    current = crew.bench.current
+    hopes = [
+        min(fitted.objective, current.objective - item.gain) for item, fitted in zip(shortlist, refits, strict=True)
     ]
+    count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
+    worst = sorted(hopes)[:count][-1]
+    free_run = current.footing.segment_s is None
+    pairs = zip(shortlist, refits, strict=True)
+    kept = [pair for pair, hope in zip(pairs, hopes, strict=True) if free_run or hope <= worst]
     return crew.rivals(kept, without)
 
 

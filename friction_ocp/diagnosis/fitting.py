@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.contrast import Contrast, contrast
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
+from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
-from friction_ocp.effects.effect import Augmentation
 from friction_ocp.estimation.fit import fit
-from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
@@ -26,11 +27,17 @@ QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
 BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
-FARTHER = 5.0
+SIZES = (1.0, 0.3, 3.0, 10.0)
+"""Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
+DETOUR = 0.05
+"""Smoothing of the sign over the typical speed on the way around kinks."""
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
 MOST_FOLDS = 4
 """Groups of recordings that free runs are fitted without, one after another."""
+UNIMPORTANT, NEARLY = 1.0, 0.3
+"""Difference between what a step gains and what it predicts up to which it is believed: of the objective, where half a
+unit is a standard error, or a share of the prediction."""
 SHRINK = 0.01
 """Share of the information of a left-out recording that is kept: where nothing else informs, a step stays small."""
 
@@ -42,6 +49,8 @@ class FittedModel:
     model: Model
     footing: Footing
     linear: LinearProgram
+    smooth: bool = True
+    """Whether the fit ended where nothing more is to be gained, not at a kink of exact friction."""
 
     @property
     def theta(self) -> FloatArray:
@@ -73,7 +82,7 @@ def fit_base(model: Model) -> FittedModel:
     foot = footing(model, end.theta)
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
-    return polished(model, foot, end.theta, nodes if foot.train is program.experiments else None)
+    return freed(polished(model, foot, end.theta, nodes if foot.train is program.experiments else None))
 
 
 def _rough_answer(model: Model) -> tuple[Program, Point]:
@@ -99,52 +108,72 @@ def polished(
     point = Point(theta, program.suggested_nodes(theta) if nodes is None else nodes)
     if nodes is None:
         point = solve_nodes(program, point)
-    end = solve_gauss_newton(program, point, limits).point if theta.size else solve_nodes(program, point)
-    return FittedModel(model, foot, linear_program(program, end))
+    if not theta.size:
+        return FittedModel(model, foot, linear_program(program, solve_nodes(program, point)))
+    end = solve_gauss_newton(program, point, limits)
+    return FittedModel(model, foot, linear_program(program, end.point), end.smooth and end.converged)
 
 
-def quick_refit(base: FittedModel, drive: Drive, starts: Sequence[Mapping[str, float]]) -> FittedModel:
-    """Fit a candidate drive, a few steps from each start: the base model's answer and predicted values of the rest."""
+def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
+    """Fit a candidate, a few steps from each of the starts that the score test predicts.
+
+    The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
+    """
+    drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
-    return min((_quick(base, model, built, values) for values in starts), key=lambda fitted: fitted.objective)
+    program = base.footing.training(model)
+    points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
+    ends = [_steps(base, model, program, point) for point in points]
+    return min(ends, key=lambda fitted: fitted.objective)
 
 
-def farther(values: Mapping[str, float], augmentation: Augmentation) -> dict[str, float]:
-    """Return a start several times as far from off as predicted: under a large misfit predictions fall short."""
-    grown = {path for trial in augmentation.trials for amplitude in trial.amplitudes for path in amplitude}
-    inverse = any(trial.inverse for trial in augmentation.trials)
-    found = dict(values)
-    for path in grown & found.keys():
-        off = augmentation.off.get(path, 0.0)
-        found[path] = found[path] / FARTHER if inverse else off + FARTHER * (found[path] - off)
-    return found
+def _launches(
+    base: FittedModel, item: Screened, start: Start, model: Model, built: Contrast, program: Program
+) -> list[Point]:
+    """Return the point at the predicted size, and the one at the size that comes closest where that is another."""
+    off = item.augmentation.off
+    points = [_point(base, model, built, start.values(off, base.values, scale)) for scale in SIZES]
+    closest = min(range(len(points)), key=lambda k: program.objective(points[k]))
+    return [points[k] for k in sorted({0, closest})]
+
+
+def _point(base: FittedModel, model: Model, built: Contrast, values: Mapping[str, float]) -> Point:
+    wanted = dict(zip(built.space.names, built.theta(values), strict=True))
+    theta = model.space.clip(np.array([wanted[name] for name in model.space.names]))
+    known = dict(zip(model.space.names, theta, strict=True))
+    at = np.array([known[name] for name in built.space.names])
+    return Point(theta, tuple(built.simulate(k, item, at)[2] for k, item in enumerate(base.linear.recordings)))
+
+
+def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:
+    finite = np.isfinite(program.objective(point))
+    return polished(model, base.footing, point.theta, point.nodes if finite else None, QUICK)
 
 
 def completed(fitted: FittedModel) -> FittedModel:
-    """Continue a refit to its end.
+    """Continue a refit to its end, around the kinks of exact friction that catch it."""
+    return freed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
 
-    Free runs have local minima that a few steps from the base model's answer do not leave: they are fitted as the base
-    model was, from there.
+
+def freed(fitted: FittedModel) -> FittedModel:
+    """Go on from an end at a kink: through friction with a smoothed sign, and back; elsewhere return what came in.
+
+    A long free run far above the noise is caught by kinks that no single step shows.
     """
-    if fitted.footing.segment_s is None and fitted.theta.size:
-        model = fitted.model
-        theta = fit(replace(model, space=model.space.moved(fitted.theta))).solution.point.theta
-        thorough = polished(model, fitted.footing, theta, None)
-        return min(thorough, fitted, key=lambda item: item.objective)
-    return polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes)
+    caught = not fitted.smooth or (fitted.footing.segment_s is None and not _is_noise(fitted))
+    if not caught or not fitted.theta.size:
+        return fitted
+    beyond = _around_kinks(fitted.model, fitted.linear.program, fitted.linear.point, WARM)
+    if beyond.objective >= fitted.objective:
+        return fitted
+    return replace(fitted, linear=linear_program(fitted.linear.program, beyond.point))
 
 
-def _quick(base: FittedModel, model: Model, built: Contrast, values: Mapping[str, float]) -> FittedModel:
-    wanted = built.theta(values)
-    by_name = dict(zip(built.space.names, wanted, strict=True))
-    theta = np.array([by_name[name] for name in model.space.names])
-    theta = model.space.clip(theta)
-    known = {name: value for name, value in zip(model.space.names, theta, strict=True)}
-    at = np.array([known[name] for name in built.space.names])
-    nodes = tuple(built.simulate(k, item, at)[2] for k, item in enumerate(base.linear.recordings))
-    if not all(np.all(np.isfinite(item)) for item in nodes):
-        return polished(model, base.footing, theta, None, QUICK)
-    return polished(model, base.footing, theta, nodes, QUICK)
+def _is_noise(fitted: FittedModel) -> bool:
+    """Whether the cost is no more than that of noise, the floors being off by their doubt."""
+    rows = fitted.linear.rows
+    samples = int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
+    return fitted.objective < 0.5 * samples * (1.0 + FLOOR_DOUBT) ** 2
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
@@ -152,51 +181,56 @@ def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
     model = with_drive(current.model, drive)
     known = current.values
     theta = np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])
-    return polished(model, current.footing, theta, None)
+    return freed(polished(model, current.footing, theta, None))
 
 
 def held_out(fitted: FittedModel) -> FloatArray:
     """Return (rows,) costs of every recording under parameters that it took no part in; its states are its own.
 
-    Where short segments make the program nearly linear, the parameters without a recording are one Gauss-Newton step
-    from those with all of them; free runs are fitted again without it.
+    Where the program is nearly linear, the parameters without some recordings are one Gauss-Newton step from those with
+    all of them; where that step does not gain what it predicts, they are fitted.
     """
-    if fitted.footing.segment_s is None:
-        return _held_out_free_runs(fitted)
-    rows, count = fitted.linear.rows, len(fitted.linear.recordings)
-    prior = rows.jacobian[rows.recording < 0]
-    hessians = [item.jacobian.T @ item.jacobian for item in fitted.linear.recordings]
-    gradients = [item.jacobian.T @ item.residual for item in fitted.linear.recordings]
-    costs: list[FloatArray] = []
-    for k, item in enumerate(fitted.linear.recordings):
-        rest = sum((hessians[j] for j in range(count) if j != k), prior.T @ prior) + SHRINK * hessians[k]
-        theta = fitted.model.space.clip(fitted.theta + _solve(rest, gradients[k]))
-        program = _only(fitted.linear.program, k)
-        nodes = item.nodes + item.moved_by(theta - fitted.theta)
-        point = solve_nodes(program, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT)
-        costs.append(raw_costs(program, point))
-    return np.concatenate([*costs, np.zeros(rows.residual.size - sum(cost.size for cost in costs))])
-
-
-def _held_out_free_runs(fitted: FittedModel) -> FloatArray:
-    program, point = fitted.linear.program, fitted.linear.point
-    count = len(program.experiments)
-    groups = _folds(fitted)
+    program = fitted.linear.program
     costs: dict[int, FloatArray] = {}
-    for group in groups:
-        others = [k for k in range(count) if k not in group]
-        rest = replace(
-            program,
-            experiments=tuple(program.experiments[k] for k in others),
-            segments=tuple(program.segments[k] for k in others),
-        )
-        start = Point(point.theta, tuple(point.nodes[k] for k in others))
-        theta = solve_gauss_newton(rest, start, FOLD).point.theta if others else point.theta
+    for group in _folds(fitted):
+        theta = _without(fitted, group)
         for k in group:
+            item = fitted.linear.recordings[k]
             alone = _only(program, k)
-            costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (point.nodes[k],)), STEPS_FROM_HELD_OUT))
-    found = [costs[k] for k in range(count)]
+            nodes = item.nodes + item.moved_by(theta - fitted.theta)
+            costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT))
+    found = [costs[k] for k in range(len(program.experiments))]
     return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
+
+
+def _without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
+    """Return the parameters fitted to all recordings but some."""
+    rows, program, point = fitted.linear.rows, fitted.linear.program, fitted.linear.point
+    others = [k for k in range(len(program.experiments)) if k not in group]
+    if not others or not fitted.theta.size:
+        return fitted.theta
+    kept, left = np.isin(rows.recording, others) | (rows.recording < 0), np.isin(rows.recording, group)
+    information = rows.jacobian[kept].T @ rows.jacobian[kept] + SHRINK * rows.jacobian[left].T @ rows.jacobian[left]
+    pull = rows.jacobian[kept].T @ rows.residual[kept]
+    step = fitted.model.space.clip(fitted.theta - _solve(information, pull)) - fitted.theta
+    predicted = -float(pull @ step) - 0.5 * float(step @ information @ step)
+    rest = _some(program, others)
+    before = rest.objective(Point(fitted.theta, tuple(point.nodes[k] for k in others)))
+    moved = tuple(fitted.linear.recordings[k].nodes + fitted.linear.recordings[k].moved_by(step) for k in others)
+    gained = before - rest.objective(Point(fitted.theta + step, moved))
+    if abs(gained - predicted) <= max(UNIMPORTANT, NEARLY * abs(predicted)):
+        return fitted.theta + step
+    start = Point(fitted.theta, tuple(point.nodes[k] for k in others))
+    ended = solve_gauss_newton(rest, start, FOLD)
+    if fitted.footing.segment_s is None:
+        ended = min(ended, _around_kinks(fitted.model, rest, ended.point, FOLD), key=lambda item: item.objective)
+    return ended.point.theta
+
+
+def _around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:
+    """Solve again from where friction with a smoothed sign leads to."""
+    rounded = replace(program, width=DETOUR * model.speed_scale)
+    return solve_gauss_newton(program, solve_gauss_newton(rounded, point, COARSE).point, limits)
 
 
 def _folds(fitted: FittedModel) -> list[list[int]]:
@@ -217,7 +251,16 @@ def _folds(fitted: FittedModel) -> list[list[int]]:
 
 
 def _only(program: Program, index: int) -> Program:
-    return replace(program, experiments=(program.experiments[index],), segments=(program.segments[index],))
+    return _some(program, [index])
+
+
+def _some(program: Program, indices: Sequence[int]) -> Program:
+    """Return the program of some of the recordings."""
+    return replace(
+        program,
+        experiments=tuple(program.experiments[k] for k in indices),
+        segments=tuple(program.segments[k] for k in indices),
+    )
 
 
 def raw_costs(program: Program, point: Point) -> FloatArray:

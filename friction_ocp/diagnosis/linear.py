@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,7 +33,12 @@ class Rows:
         basis = self.basis
         return columns - basis @ (basis.T @ columns)
 
-    @property
+    def fitted(self, column: FloatArray) -> FloatArray:
+        """Return (parameters,) the change of the parameters that comes closest to a column."""
+        scale = np.maximum(np.linalg.norm(self.jacobian, axis=0), 1e-300)
+        return np.asarray(np.linalg.lstsq(self.jacobian / scale, column, rcond=1e-10)[0]) / scale
+
+    @cached_property
     def basis(self) -> FloatArray:
         """(rows, rank) orthonormal basis of what the parameters can do."""
         scale = np.linalg.norm(self.jacobian, axis=0)

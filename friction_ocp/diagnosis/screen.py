@@ -18,8 +18,27 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
-SECOND = 0.3
-"""Gain of a second start over that of the first from which it is worth trying."""
+OTHER, MOST_STARTS = 0.3, 3
+"""Gain of a further start over that of the first from which it is worth trying, and how many there are at most."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a refit may begin: a trial at its predicted size, and how the base model's parameters make room for it."""
+
+    trial: Trial
+    sizes: tuple[float, ...]
+    shift: Mapping[str, float]
+    """Predicted change of the parameters of the base model."""
+
+    def added(self, off: Mapping[str, float], scale: float = 1.0) -> dict[str, float]:
+        """Return the values of the added parameters at `scale` times the predicted size."""
+        return self.trial.values(off, [scale * size for size in self.sizes])
+
+    def values(self, off: Mapping[str, float], known: Mapping[str, float], scale: float) -> dict[str, float]:
+        """Return the values of all parameters at `scale` times the predicted size."""
+        moved = {name: known[name] + scale * step for name, step in self.shift.items()}
+        return {**known, **moved, **self.added(off, scale)}
 
 
 @dataclass(frozen=True)
@@ -32,14 +51,14 @@ class Screened:
     """Predicted decrease of the objective at its best trial."""
     p_value: float
     """Corrected for the number of trials."""
-    starts: tuple[Mapping[str, float], ...]
-    """Predicted values of the added parameters, best first, from trials that are not neighbours."""
+    starts: tuple[Start, ...]
+    """Best first, from trials that are not neighbours."""
     augmentation: Augmentation
 
     @property
     def values(self) -> Mapping[str, float]:
         """Predicted values of the added parameters."""
-        return self.starts[0]
+        return self.starts[0].added(self.augmentation.off) if self.starts else {}
 
     @property
     def key(self) -> tuple[str, str]:
@@ -57,29 +76,43 @@ def screen(
     except FrictionOcpError:
         return None
     found = [_tried(built, blocks, augmentation, trial) for trial in augmentation.trials]
-    best = max(range(len(found)), key=lambda k: found[k][0])
-    gain, p_value, values = found[best]
-    others = [k for k in range(len(found)) if abs(k - best) > 1 and found[k][0] > SECOND * gain]
-    second = [found[max(others, key=lambda k: found[k][0])][2]] if others else []
-    return Screened(effect.name, place, gain, min(1.0, p_value * len(found)), (values, *second), augmentation)
+    order = sorted(range(len(found)), key=lambda k: -found[k].gain)
+    best, chosen = found[order[0]], list[int]()
+    for k in order:
+        near = any(abs(k - other) <= 1 for other in chosen)
+        if found[k].start is not None and not near and found[k].gain >= OTHER * best.gain:
+            chosen.append(k)
+    starts = [found[k].start for k in chosen[:MOST_STARTS]]
+    p_value = min(1.0, best.p_value * len(found))
+    return Screened(effect.name, place, best.gain, p_value, tuple(x for x in starts if x is not None), augmentation)
 
 
-def _tried(
-    built: Contrast, blocks: Blocks, augmentation: Augmentation, trial: Trial
-) -> tuple[float, float, Mapping[str, float]]:
-    count = len(trial.amplitudes)
-    off = augmentation.off
+@dataclass(frozen=True)
+class _Tried:
+    gain: float
+    p_value: float
+    start: Start | None
+
+
+NOT_TOLD = _Tried(0.0, 1.0, None)
+
+
+def _tried(built: Contrast, blocks: Blocks, augmentation: Augmentation, trial: Trial) -> _Tried:
+    count, off, rows = len(trial.amplitudes), augmentation.off, built.base.rows
     columns = built.columns([{**off, **trial.fixed, **trial.amplitudes[j]} for j in range(count)])
     if not np.all(np.isfinite(columns)):
-        return 0.0, 1.0, {}
-    left = built.base.rows.absorbed(columns)
+        return NOT_TOLD
+    left = rows.absorbed(columns)
     if not _stands_out(columns, left):
-        return 0.0, 1.0, {}
-    found: Score = score(built.base.rows, blocks, left)
+        return NOT_TOLD
+    found: Score = score(rows, blocks, left)
     sizes = _allowed(augmentation.drive, trial, off, found.sizes)
     if not np.any(sizes):
-        return 0.0, 1.0, {}
-    return found.gain, found.p_value, trial.values(off, list(sizes))
+        return NOT_TOLD
+    shift = -rows.fitted(columns @ sizes)
+    names = built.model.space.names
+    start = Start(trial, tuple(map(float, sizes)), dict(zip(names, map(float, shift), strict=True)))
+    return _Tried(found.gain, found.p_value, start)
 
 
 RANK = 1e-6

@@ -13,6 +13,10 @@ from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 
 RESAMPLES = 2000
+TOLD = 3.0
+"""Log-likelihood between two sets of residuals from which recordings tell them apart: odds of 20 to 1."""
+SURE = 0.95
+"""Probability that an alias set holds."""
 ENOUGH_RECORDINGS = 6
 """From which whole recordings are resampled."""
 
@@ -45,7 +49,9 @@ class Choice:
     """Whether the held-out gain of the best rival is positive at the level asked for; or, where none stands out by
     itself, that of whichever is best, the level being shared among them (Bonferroni)."""
     aliases: tuple[Rival, ...]
-    """The best rival and all whose difference to it is within its own scatter."""
+    """The best rivals: the smallest set that is sure to hold the best."""
+    same: tuple[Rival, ...] = ()
+    """The best rival and all that leave the same residuals."""
 
 
 def resamples(blocks: Blocks, rng: np.random.Generator) -> FloatArray:
@@ -68,36 +74,85 @@ def resamples(blocks: Blocks, rng: np.random.Generator) -> FloatArray:
 
 
 def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random.Generator) -> Choice:
-    """Weigh rivals by their held-out gains; `level` is the significance asked for."""
+    """Weigh rivals by their held-out gains; `level` is the significance asked for.
+
+    A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
+    two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Rivals that
+    leave the same residuals share what they have together, fewer parameters taking more (Akaike 1973).
+    """
     if not rivals:
         return Choice((), (), 1.0, False, ())
-    ordered = sorted(rivals, key=lambda rival: -float(np.sum(rival.gains)))
     draws = resamples(blocks, rng)
-    totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in ordered)])
-    wins = np.bincount(np.argmax(totals, axis=1), minlength=len(ordered) + 1) + 1.0 / (len(ordered) + 1)
-    shares = wins / wins.sum()
-    best = totals[:, 1]
+    totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in rivals)])
+    shares = _weights(totals).mean(axis=0)
+    chances = _shared(rivals, shares[1:])
+    order = sorted(range(len(rivals)), key=lambda k: -chances[k])
+    ordered = [rivals[k] for k in order]
+    best = totals[:, order[0] + 1]
     alone = bool(np.quantile(best, level) > 0)
-    some = bool(shares[0] < level / len(ordered))
-    aliases = [
-        rival
-        for k, rival in enumerate(ordered)
-        if k == 0 or (np.quantile(best - totals[:, k + 1], level) <= 0 < _least(totals[:, k + 1], level, alone))
-    ]
-    order = sorted(range(len(ordered)), key=lambda k: -float(shares[k + 1]))
+    aliases = ordered[: _needed([chances[k] for k in order])]
+    some = bool(shares[0] < level / len(rivals))
     return Choice(
-        tuple(ordered[k] for k in order),
-        tuple(float(shares[k + 1]) for k in order),
-        float(shares[0]),
-        alone or (some and len(aliases) > 1),
-        tuple(sorted(aliases, key=lambda rival: -shares[ordered.index(rival) + 1])),
+        rivals=tuple(ordered),
+        probabilities=tuple(chances[k] for k in order),
+        nothing=float(shares[0]),
+        significant=alone or (some and len(aliases) > 1),
+        aliases=tuple(aliases),
+        same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
     )
 
 
-def _least(gains: FloatArray, level: float, alone: bool) -> float:
-    """Return the gain of a rival that must be positive for it to be an alias: at the level, or where no rival reaches
-    that by itself, on average."""
-    return float(np.quantile(gains, level) if alone else np.mean(gains))
+def is_same(one: Rival, other: Rival) -> bool:
+    """Whether two rivals leave the same residuals, as far as a likelihood can tell."""
+    left = [item.fitted.linear.rows.residual[item.fitted.linear.rows.channel >= 0] for item in (one, other)]
+    return left[0].size == left[1].size and 0.5 * float(np.sum((left[0] - left[1]) ** 2)) < TOLD
+
+
+def _shared(rivals: Sequence[Rival], shares: FloatArray) -> list[float]:
+    """Return probabilities in which those of the same residuals divide what they have together."""
+    owner = list[int]()
+    for k, rival in enumerate(rivals):
+        owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
+    weights = np.array([np.exp(-float(rival.fitted.theta.size + _blames_sensor(rival))) for rival in rivals])
+    found = list[float]()
+    for k in range(len(rivals)):
+        own = [j for j in range(len(rivals)) if owner[j] == owner[k]]
+        found.append(float(sum(shares[own]) * weights[k] / sum(weights[own])))
+    return found
+
+
+def _blames_sensor(rival: Rival) -> bool:
+    """Whether the measurement, not the machine, is to be wrong: of two equal explanations the less likely one."""
+    return rival.key[0].startswith("sensor_")
+
+
+def shown(aliases: Sequence[Rival]) -> tuple[Rival, ...]:
+    """Return the members of an alias set that are worth naming.
+
+    Of those that leave the same residuals as the best, only the one that says something else: another effect, and at
+    another component where there is one. The others are no further explanations but the same one in other words.
+    """
+    if not aliases:
+        return ()
+    best = aliases[0]
+    same = [rival for rival in aliases[1:] if is_same(rival, best)]
+    others = [rival for rival in aliases[1:] if rival not in same]
+    different = sorted(
+        same, key=lambda rival: (rival.key[0] == best.key[0], _blames_sensor(rival), rival.key[1] == best.key[1])
+    )
+    return (best, *different[:1], *others)
+
+
+def _weights(totals: FloatArray) -> FloatArray:
+    """Return (resamples, rivals + 1) shares of the likelihood."""
+    likelihood = np.exp(totals - totals.max(axis=1, keepdims=True))
+    return likelihood / likelihood.sum(axis=1, keepdims=True)
+
+
+def _needed(chances: Sequence[float]) -> int:
+    """Return how many rivals, best first, hold what is sure of the probability that all of them have."""
+    sums = np.cumsum(chances)
+    return int(np.searchsorted(sums, SURE * sums[-1])) + 1
 
 
 def probabilities(choice: Choice, gap: bool) -> Mapping[str, float]:

@@ -15,6 +15,7 @@ from friction_ocp.effects.effect import (
     change_channel,
     change_motor,
     change_shaft,
+    channel,
     either_way,
     motor_of,
     moving_shafts,
@@ -105,8 +106,12 @@ class PeriodicDisturbanceEffect(AbstractEffect):
         return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
 
 
+LARGEST = 0.5
+"""Once-per-turn error, rad, beyond which a sensor is broken rather than eccentric."""
+
+
 class SensorEccentricityEffect(AbstractEffect):
-    """A once-per-turn error of an angle sensor."""
+    """A once-per-turn error of an angle sensor, whose zero then is where the disc was mounted: unknown, too."""
 
     name: ClassVar[str] = "sensor_eccentricity"
     sentence: ClassVar[str] = "the angle sensor has a once-per-turn error"
@@ -117,8 +122,11 @@ class SensorEccentricityEffect(AbstractEffect):
         return [item.name for item in angles if item.eccentricity is None]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        size, path = 1e-3, f"{place}.eccentricity"
-        amplitude = Free(size, -0.2, 0.2)
-        paths = [f"{path}.cosine", f"{path}.sine"]
+        size, path, offset = 1e-3, f"{place}.eccentricity", f"{place}.offset"
+        amplitude = Free(size, -LARGEST, LARGEST)
+        sizes = {f"{path}.cosine": size, f"{path}.sine": size}
         added = change_channel(drive, place, eccentricity=Eccentricity(amplitude, amplitude))
-        return Augmentation(added, dict.fromkeys(paths, 0.0), (Trial(tuple({name: size} for name in paths)),))
+        if channel(drive, place).offset == 0.0:
+            added, sizes = change_channel(added, place, offset=either_way(size)), {**sizes, offset: size}
+        trial = Trial(tuple({name: value} for name, value in sizes.items()))
+        return Augmentation(added, dict.fromkeys(sizes, 0.0), (trial,))

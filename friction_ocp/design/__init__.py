@@ -1,0 +1,1 @@
+"""What to record next: motions within limits, and what each would tell about parameters and rivals."""

@@ -1,0 +1,147 @@
+"""Design on one page: base fit -> motions within limits -> what each would tell -> the best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Literal
+
+import numpy as np
+
+from friction_ocp.design.limits import Limits, limits_of
+from friction_ocp.design.motions import MOTIONS
+from friction_ocp.design.trial_run import TrialRun, trial_run
+from friction_ocp.design.worth import Evidence, evidence, information, known_information
+from friction_ocp.diagnosis.blocks import blocks_of
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
+from friction_ocp.diagnosis.screen import screen
+from friction_ocp.effects.registry import candidates, effects
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.simulation.grid import FloatArray
+
+Criterion = Literal["D", "A", "separation"]
+Key = tuple[str, str]
+"""Effect and component."""
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Option:
+    """A motion and what it would tell."""
+
+    run: TrialRun
+    worth: float
+    """By the criterion; larger is better."""
+    power: float | None = None
+    """Probability that it decides between the rivals, the least over them."""
+    std_errors: FloatArray | None = None
+    """(parameters,) expected with this recording beside those at hand."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Motions that were considered, best first."""
+
+    problem: Problem
+    fitted: FittedModel
+    criterion: Criterion
+    limits: Limits
+    options: tuple[Option, ...]
+    std_errors: FloatArray
+    """(parameters,) with the recordings at hand."""
+
+
+def designed(problem: Problem, criterion: Criterion, between: Sequence[Key], tell: Tell) -> Design:
+    """Find what to record for a problem: to sharpen its parameters or, where candidates are named, to tell them apart.
+
+    Raises FrictionOcpError where one is named that there is not, or only one.
+    """
+    tell("base model", 0.0)
+    base = fit_base(prepare(problem))
+    if not between:
+        return sharpening(base, criterion, tell)
+    entries = {(effect.name, place): effect for effect, place in candidates(problem.drive, list(effects()))}
+    wrong = [
+        Finding(f"--between {name}@{place}", "there is no such candidate", f"{_nearest(name, list(entries))}")
+        for name, place in between
+        if (name, place) not in entries
+    ]
+    if not wrong and len(set(between)) < 2:
+        wrong = [Finding("--between", "one candidate has nothing to be told from", "two or more EFFECT@PLACE")]
+    if wrong:
+        raise FrictionOcpError(wrong)
+    clues, blocks = clues_of(base), blocks_of(base.linear.rows)
+    seen = [screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)]
+    rivals = [completed(quick_refit(base, item)) for item in seen if item is not None and item.starts]
+    return separating(base, rivals, tell)
+
+
+def _nearest(name: str, known: Sequence[Key]) -> str:
+    """Return the places of an effect, or all candidates where there is no such effect."""
+    same = [key for key in known if key[0] == name] or known
+    return ", ".join(f"{effect}@{place}" for effect, place in same)
+
+
+def sharpening(fitted: FittedModel, criterion: Criterion, tell: Tell = lambda what, share: None) -> Design:
+    """Find the motion that sharpens the parameters of a fitted model most.
+
+    D: the largest gain in the logarithm of the determinant of the information, half of it in decades of volume of the
+    confidence ellipsoid. A: the smallest mean of squared relative standard errors. Source: Pukelsheim 2006.
+    """
+    limits = limits_of(fitted.model.problem, clues_of(fitted))
+    known, scale = known_information(fitted), _scale(fitted)
+    options: list[Option] = []
+    for run in _runs(fitted, limits, tell):
+        both = known + information(fitted, run.recording)
+        worth = _volume(both, scale) - _volume(known, scale) if criterion == "D" else -_mean_square(both, scale)
+        options.append(Option(run, worth, std_errors=_std_errors(both)))
+    options.sort(key=lambda option: -option.worth)
+    return Design(fitted.model.problem, fitted, criterion, limits, tuple(options), _std_errors(known))
+
+
+def separating(base: FittedModel, rivals: Sequence[FittedModel], tell: Tell = lambda what, share: None) -> Design:
+    """Find the motion that tells rivals apart best: the least separation over all pairs, either being true."""
+    limits = limits_of(base.model.problem, clues_of(base))
+    options: list[Option] = []
+    by_rival = [{run.motion.name: run for run in _runs(rival, limits, tell)} for rival in rivals]
+    for motion in by_rival[0]:
+        if not all(motion in runs for runs in by_rival):
+            continue
+        pairs = permutations(range(len(rivals)), 2)
+        found: list[Evidence] = [evidence(rivals[k], by_rival[j][motion].recording) for j, k in pairs]
+        least = min(found, key=lambda item: item.separation)
+        options.append(Option(by_rival[0][motion], least.separation, power=least.power))
+    options.sort(key=lambda option: -option.worth)
+    errors = _std_errors(known_information(base))
+    return Design(base.model.problem, base, "separation", limits, tuple(options), errors)
+
+
+def _runs(fitted: FittedModel, limits: Limits, tell: Tell) -> list[TrialRun]:
+    found: list[TrialRun] = []
+    for k, motion in enumerate(MOTIONS):
+        tell(f"motion {motion.name}", k / len(MOTIONS))
+        run = trial_run(fitted, motion, limits)
+        found += [] if run is None else [run]
+    return found
+
+
+def _scale(fitted: FittedModel) -> FloatArray:
+    return np.maximum(np.abs(fitted.theta), 1e-12)
+
+
+def _volume(matrix: FloatArray, scale: FloatArray) -> float:
+    """Return the logarithm of the determinant over directions that anything is known of."""
+    scaled = matrix * np.outer(scale, scale)
+    return float(np.sum(np.log(np.maximum(np.linalg.eigvalsh(scaled), 1e-12))))
+
+
+def _mean_square(matrix: FloatArray, scale: FloatArray) -> float:
+    return float(np.mean((_std_errors(matrix) / scale) ** 2))
+
+
+def _std_errors(matrix: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix, rcond=1e-14)), 0.0))

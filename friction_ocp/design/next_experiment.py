@@ -1,0 +1,77 @@
+"""What to record where the recordings cannot tell candidates apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from friction_ocp.design.design import Design, Option, separating
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Tell
+from friction_ocp.diagnosis.select import shown
+
+_EXCITATION = {
+    "stribeck": "speeds from well below to well above the Stribeck speed, slowly and in both directions",
+    "polyline_break": "constant speeds on either side of the break, up to the fastest",
+    "quadratic_drag": "constant speeds up to the fastest, in both directions",
+    "asymmetry": "the same speeds in both directions over the same positions",
+    "presliding": "small reversals that do not break away, torque rising and falling below breakaway",
+    "load_dependence": "the same speeds under several loads",
+    "warm_up": "the same motion cold and warm, with the temperature recorded",
+    "backlash": "slow reversals with the load at rest and under load on one flank",
+    "compliance": "a sweep through the resonance with both sides measured",
+    "unbalance": "more than a turn of travel, slowly, in both directions",
+    "constant_torque": "standstill and slow motion in both directions",
+    "position_ripple": "slow constant speeds over several periods, in both directions",
+    "cogging": "slow constant speeds over a turn of the motor",
+    "structural_mode": "a sweep through the frequencies of the structure",
+    "sensor_offset": "a rest in a known state with the drive off",
+    "sensor_delay": "a fast sweep that separates a delay from compliance",
+}
+"""Motion that makes an effect visible, by effect."""
+
+
+HOPELESS = 1.0
+"""Expected squared distance, in noise floors, below which no motion separates rivals."""
+
+
+@dataclass(frozen=True)
+class FollowUp:
+    """What to record next."""
+
+    rivals: tuple[Key, ...]
+    text: str
+    design: Design | None
+    """Motions within the limits, the one that separates the rivals best first; None where none could be simulated."""
+
+    @property
+    def option(self) -> Option | None:
+        """The motion to record; None where none separates the rivals."""
+        best = self.design.options[0] if self.design is not None and self.design.options else None
+        return best if best is not None and best.worth >= HOPELESS else None
+
+
+def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> FollowUp | None:
+    """Return what to record to separate the members of the first alias set; None where there is none."""
+    if not diagnosis.alias_sets:
+        return None
+    wanted = set(diagnosis.alias_sets[0])
+    done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
+    rivals = shown(done.choice.aliases)
+    keys = tuple(rival.key for rival in rivals)
+    design = separating(done.before, [rival.fitted for rival in rivals], tell)
+    found = FollowUp(keys, "", design)
+    return FollowUp(keys, _text(keys, found.option), design)
+
+
+def _text(keys: tuple[Key, ...], option: Option | None) -> str:
+    named = " or ".join(f"{effect} at {place}" for effect, place in keys)
+    hints = [f"{_EXCITATION[effect]} ({effect} at {place})" for effect, place in keys if effect in _EXCITATION]
+    if option is None:
+        return (
+            f"No motion within the limits tells {named} apart with these channels: they say the same in other words, "
+            f"or a further sensor is needed. What shows each by itself: {'; '.join(hints) or 'other loads'}."
+        )
+    run = option.run
+    return (
+        f"To tell {named} apart, record {run.motion.sentence}, up to {run.amplitude:.0%} of the allowed speed, as in "
+        f"next_experiment.h5: one recording decides with a probability of {option.power or 0.0:.0%}."
+    )

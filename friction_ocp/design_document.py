@@ -1,0 +1,59 @@
+"""A design as the document that result.json holds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from friction_ocp.design.design import Design, Option
+from friction_ocp.drive.units import unit_of
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.result_document import heading, provenance
+
+FORMAT = "friction-ocp-design/1"
+RECORDING = "excitation.h5"
+
+
+def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str, Any]:
+    """Return the content of result.json for a design; `between` are the rivals it separates, if any."""
+    names = design.fitted.model.space.names
+    drive = design.problem.drive
+    units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
+    return {
+        "format": FORMAT,
+        "status": "designed" if design.options else "nothing_possible",
+        **heading(design.problem),
+        "criterion": design.criterion,
+        "separates": [{"effect": effect, "component": place} for effect, place in between],
+        "limits": {key: getattr(design.limits, key) for key in ("speed", "torque", "travel")},
+        "limits_stated": list(design.limits.stated),
+        "recording": RECORDING if design.options else None,
+        "options": [_option(design, item) for item in design.options],
+        "parameters": {
+            name: {
+                "value": float(value),
+                "unit": units.get(name.partition("@")[0], ""),
+                "std_error_before": _number(float(error)),
+            }
+            for name, value, error in zip(names, design.fitted.theta, design.std_errors, strict=True)
+        },
+        "provenance": provenance(design.problem),
+    }
+
+
+def _option(design: Design, option: Option) -> dict[str, Any]:
+    names = design.fitted.model.space.names
+    errors = option.std_errors
+    return {
+        "motion": option.run.motion.name,
+        "sentence": option.run.motion.sentence,
+        "amplitude": option.run.amplitude,
+        "peaks": {key: _number(value) for key, value in option.run.peaks.items()},
+        "worth": _number(option.worth),
+        "power": option.power,
+        "std_errors": None if errors is None else {n: _number(float(e)) for n, e in zip(names, errors, strict=True)},
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

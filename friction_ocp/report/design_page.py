@@ -1,0 +1,56 @@
+"""The one page of a design; its figures are inside it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from pathlib import Path
+
+from friction_ocp.plots.numbers import percent, significant
+from friction_ocp.plots.reading import Json, objects, part, rows
+from friction_ocp.report.design_words import design_sentence, limits_sentence
+from friction_ocp.report.page import paragraphs, render_page
+from friction_ocp.whole_file import whole_file
+
+
+def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
+    """Write report.html in one step; `figures` are PNG files by name."""
+    pictures = {name: base64.b64encode(file.read_bytes()).decode() for name, file in figures.items()}
+    page = render_page(
+        "design.html",
+        {
+            **{key: str(result.get(key) or "") for key in ("title", "problem")},
+            "question": paragraphs(str(result.get("question") or "")),
+            "sentence": design_sentence(result),
+            "good": bool(rows(result, "options")),
+            "limits": limits_sentence(result),
+            "options": [_option(item) for item in rows(result, "options")],
+            "parameters": _parameters(result),
+            "figures": pictures,
+        },
+    )
+    with whole_file(path) as staged:
+        staged.write_text(page, encoding="utf-8", newline="\n")
+
+
+def _option(item: Json) -> dict[str, str]:
+    return {
+        "motion": str(item["motion"]).replace("_", " "),
+        "sentence": str(item["sentence"]),
+        "amplitude": percent(float(item["amplitude"])),
+        "worth": "" if item["worth"] is None else significant(float(item["worth"]), 3),
+        "power": "" if item["power"] is None else percent(float(item["power"])),
+    }
+
+
+def _parameters(result: Json) -> list[dict[str, str]]:
+    """Return standard errors now and with the best motion, where the design is for them."""
+    options = rows(result, "options")
+    after = part(options[0], "std_errors") if options else {}
+    found: list[dict[str, str]] = []
+    for name, item in objects(result, "parameters").items():
+        if after.get(name) is not None and item["std_error_before"] is not None:
+            numbers = {"value": item["value"], "before": item["std_error_before"], "after": after[name]}
+            texts = {key: significant(float(number), 3) for key, number in numbers.items()}
+            found.append({"name": name, "unit": str(item["unit"]), **texts})
+    return found

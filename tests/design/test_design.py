@@ -1,0 +1,109 @@
+"""A designed motion keeps its limits, and tells what it promises when the plant makes it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from diagnosis_cases import axis, write_case
+from plant import Trajectory
+
+from friction_ocp.cli import main
+from friction_ocp.design.design import Design, designed
+from friction_ocp.design.worth import evidence
+from friction_ocp.diagnosis.footing import footing
+from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.problem import RecordingUse
+from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import read_recording
+from friction_ocp.recording.recording import Channel, Recording
+
+SPEED = 30.0
+"""Limit that the problem states, rad/s: below what the recordings reach."""
+
+
+def silent(what: str, share: float) -> None:
+    """Say nothing."""
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the problem file of an axis with a limit of speed."""
+    path = write_case(tmp_path_factory.mktemp("axis"), axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["limits"] = {"speed": SPEED}
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def design(path: Path) -> Design:
+    """Return the design that sharpens the parameters of the axis."""
+    return designed(load_problem(path), "D", [], silent)
+
+
+def test_motions_keep_the_limits(design: Design) -> None:
+    """No motion exceeds the stated speed, nor the torque and travel that the recordings reached, by more than 5 %."""
+    assert design.limits.stated == ("speed",)
+    assert len(design.options) >= 6
+    for option in design.options:
+        for key, limit in (("speed", SPEED), ("torque", design.limits.torque), ("travel", design.limits.travel)):
+            assert option.run.peaks[key] <= 1.05 * limit
+
+
+def test_the_plant_confirms_the_expected_standard_errors(design: Design) -> None:
+    """The information in the best motion, made by the plant, is what the design expects, within a fifth."""
+    option, fitted = design.options[0], design.fitted
+    current = option.run.recording.channels["current"]
+    inputs = {"motor.current": Trajectory(current.time, current.values, "zero")}
+    run = axis().simulate(float(current.time[-1]), inputs, np.random.default_rng(3))
+    made = Recording("made", {key: Channel(key, *run.channels[key], unit) for key, unit in UNITS.items()})
+    problem = replace(fitted.model.problem, train=(RecordingUse(made),), validation=())
+    model = prepare(problem)
+    program = footing(model, fitted.theta).program(model, model.train)
+    linear = linear_program(program, solve_nodes(program, Point(fitted.theta, program.suggested_nodes(fitted.theta))))
+    known = fitted.linear.rows.jacobian
+    both = known.T @ known + linear.rows.jacobian.T @ linear.rows.jacobian
+    assert option.std_errors is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(both))), option.std_errors, rtol=0.2)
+
+
+UNITS = {"position": "rad", "current": "A"}
+
+
+def test_a_model_has_no_evidence_against_itself(design: Design) -> None:
+    """What a model made separates it from itself by less than a hundredth of a noise floor squared."""
+    for option in design.options[:3]:
+        assert evidence(design.fitted, option.run.recording).separation < 0.01
+
+
+def test_rivals_are_separated_by_the_best_motion(path: Path) -> None:
+    """Stribeck friction and quadratic drag, refitted, are told apart better by the first motion than by the last."""
+    problem = load_problem(write_case(path.parent, axis(law="stribeck", tau_s=0.15, omega_s=6.0)))
+    found = designed(problem, "D", [("stribeck", "motor"), ("quadratic_drag", "motor")], silent)
+    assert found.options[0].power is not None
+    assert found.options[0].power > 0.99
+    assert found.options[0].worth > 2.0 * found.options[-1].worth
+
+
+def test_the_command_leaves_a_recording_that_can_be_played(path: Path, tmp_path: Path) -> None:
+    """`design` writes result, page and a recording with the channels of the problem; A is another criterion."""
+    assert main(["design", str(path), "--criterion", "A", "--out", str(tmp_path)]) == 0
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert result["criterion"] == "A"
+    assert set(read_recording(tmp_path / result["recording"]).channels) == {"current", "position"}
+    assert result["options"][0]["sentence"] in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_candidates_that_there_are_not_are_named(path: Path) -> None:
+    """A wrong candidate is refused with those that there are."""
+    with pytest.raises(FrictionOcpError, match="stribeck@motor"):
+        designed(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)
