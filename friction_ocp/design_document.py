@@ -37,7 +37,11 @@ def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str,
             }
             for name, value, error in zip(names, design.fitted.theta, design.std_errors, strict=True)
         },
-        "provenance": provenance(design.problem),
+        "provenance": provenance(
+            design.problem,
+            "design",
+            {"criterion": design.criterion, "between": [list(pair) for pair in between]},
+        ),
     }
 
 

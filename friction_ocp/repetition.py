@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard, cast
 
+from friction_ocp.design.design import designed
+from friction_ocp.design_folder import save_design
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis_folder import save_diagnosis
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -178,6 +180,12 @@ def _diagnose(problems: Sequence[Problem], made: Json, folder: Path, execution: 
     save_diagnosis(diagnose(problems[0], execution=execution), folder)
 
 
+def _design(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
+    options = made["command"]["options"]
+    between = [(str(effect), str(place)) for effect, place in options["between"]]
+    save_design(designed(problems[0], options["criterion"], between), between, folder)
+
+
 def _multistart(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
     save(multistart(problems[0], made["command"]["options"]["starts"], execution), folder)
 
@@ -210,6 +218,7 @@ _COMMANDS: Mapping[str, Callable[[Sequence[Problem], Json, Path, Execution], Non
     "bootstrap": _bootstrap,
     "compare": _compare,
     "diagnose": _diagnose,
+    "design": _design,
     "batch": _batch,
 }
 

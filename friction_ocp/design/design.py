@@ -55,7 +55,9 @@ class Design:
     """(parameters,) with the recordings at hand."""
 
 
-def designed(problem: Problem, criterion: Criterion, between: Sequence[Key], tell: Tell) -> Design:
+def designed(
+    problem: Problem, criterion: Criterion, between: Sequence[Key], tell: Tell = lambda what, share: None
+) -> Design:
     """Find what to record for a problem: to sharpen its parameters or, where candidates are named, to tell them apart.
 
     Raises FrictionOcpError where one is named that there is not, or only one.

@@ -112,7 +112,7 @@ def _time(uses: tuple[RecordingUse, ...]) -> FloatArray:
     clocks = [max((c.time for c in use.recording.channels.values()), key=lambda one: one.size) for use in uses]
     step = float(np.median(np.concatenate([np.diff(clock) for clock in clocks])))
     span = float(np.median([clock[-1] - clock[0] for clock in clocks]))
-    return step * np.arange(round(span / step) + 1)
+    return np.asarray(step * np.arange(round(span / step) + 1), dtype=np.float64)
 
 
 def _inputs(
@@ -130,9 +130,10 @@ def _inputs(
 
 def _within(time: FloatArray, speed: FloatArray, travel: float) -> FloatArray:
     """Return the angle of a motion, from rest at zero, within the travel."""
-    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
-    angle -= np.linspace(0.0, angle[-1], angle.size)
-    return angle * min(1.0, travel / max(float(np.ptp(angle)), 1e-300))
+    steps: FloatArray = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
+    angle: FloatArray = np.concatenate([np.zeros(1), steps.cumsum()])
+    level: FloatArray = angle - np.linspace(0.0, float(angle[-1]), angle.size)
+    return level * min(1.0, travel / max(float(np.ptp(level)), 1e-300))
 
 
 def _watched(drive: Drive) -> Drive:

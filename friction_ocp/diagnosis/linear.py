@@ -36,7 +36,8 @@ class Rows:
     def fitted(self, column: FloatArray) -> FloatArray:
         """Return (parameters,) the change of the parameters that comes closest to a column."""
         scale = np.maximum(np.linalg.norm(self.jacobian, axis=0), 1e-300)
-        return np.asarray(np.linalg.lstsq(self.jacobian / scale, column, rcond=1e-10)[0]) / scale
+        answer = np.asarray(np.linalg.lstsq(self.jacobian / scale, column, rcond=1e-10)[0], dtype=np.float64)
+        return answer / scale
 
     @cached_property
     def basis(self) -> FloatArray:

@@ -151,8 +151,10 @@ def _weights(totals: FloatArray) -> FloatArray:
 
 def _needed(chances: Sequence[float]) -> int:
     """Return how many rivals, best first, hold what is sure of the probability that all of them have."""
-    sums = np.cumsum(chances)
-    return int(np.searchsorted(sums, SURE * sums[-1])) + 1
+    total, held, count = sum(chances), 0.0, 0
+    while held < SURE * total and count < len(chances):
+        held, count = held + chances[count], count + 1
+    return max(count, 1)
 
 
 def probabilities(choice: Choice, gap: bool) -> Mapping[str, float]:

@@ -46,7 +46,7 @@ def _option(item: Json) -> dict[str, str]:
 def _parameters(result: Json) -> list[dict[str, str]]:
     """Return standard errors now and with the best motion, where the design is for them."""
     options = rows(result, "options")
-    after = part(options[0], "std_errors") if options else {}
+    after = part(options[0] if options else {}, "std_errors")
     found: list[dict[str, str]] = []
     for name, item in objects(result, "parameters").items():
         if after.get(name) is not None and item["std_error_before"] is not None:
