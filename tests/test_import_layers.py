@@ -27,6 +27,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("result_folder", "fleet_document"),
     ("diagnosis_folder", "design_folder", "fleet_folder"),
     ("repetition",),
+    ("side_by_side",),
     ("cli",),
     ("__init__", "__main__"),
 )

@@ -34,8 +34,9 @@ def add_commands(commands: Any) -> None:
     add_job(commands, "multistart", "fit from many starts; say whether they agree", _multistart)
     add_job(commands, "profile", "profile likelihood of every fitted parameter", _profile)
     add_job(commands, "bootstrap", "scatter of the estimate over resampled residuals", _bootstrap)
-    comparing = commands.add_parser("compare", help="models of the same recordings side by side")
-    comparing.add_argument("problems", type=Path, nargs="+", metavar="problem")
+    comparing = commands.add_parser("compare", help="models of the same recordings, or results, side by side")
+    text = "problem files to fit, or results (result.json or its folder)"
+    comparing.add_argument("problems", type=Path, nargs="+", metavar="problem", help=text)
     comparing.add_argument("--out", type=Path, help="output folder; default results/<first problem stem>-compare")
     comparing.add_argument("--json", action="store_true", help="result.json on standard output")
     comparing.set_defaults(run=_compare)
@@ -74,12 +75,32 @@ def _bootstrap(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
+    from friction_ocp.side_by_side import result_file
     from friction_ocp.statistics.compare import compare
 
+    if any(result_file(path) for path in options.problems):
+        return _compare_results(options)
     options.problem = options.problems[0]
     problems = [checked(argparse.Namespace(problem=path)) for path in options.problems]
     pairs = _pairs(options.nested)
     return _work(options, lambda execution: compare(problems, pairs, execution))
+
+
+def _compare_results(options: argparse.Namespace) -> int:
+    from friction_ocp.report.side_by_side_page import side_by_side_text
+    from friction_ocp.side_by_side import read_results, save_side_by_side, side_by_side
+
+    if len(options.problems) < 2:
+        raise FrictionOcpError(Finding("compare", "1 result given", "two or more"))
+    named: Path = options.problems[0]
+    options.problem = Path((named if named.is_dir() else named.parent).resolve().name)
+    folder = output_folder(options)
+    document = side_by_side(read_results(options.problems))
+    save_side_by_side(document, folder)
+    print((folder / "result.json").read_text(encoding="utf-8") if options.json else side_by_side_text(document))
+    if not options.json:
+        print(f"Report: {folder / 'report.html'}")
+    return DONE
 
 
 def _pairs(texts: Sequence[str]) -> list[tuple[str, str]]:

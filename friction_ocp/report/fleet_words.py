@@ -14,14 +14,15 @@ def fleet_sentence(result: Json) -> str:
     """Say what changed in one sentence or two."""
     moving, out = flagged(result), rows(result, "outliers")
     rate = percent(result["false_alarm_rate"])
-    machines = len(part(result, "machines"))
+    count = len(part(result, "machines"))
+    machines = f"{count} machine{'s' * (count != 1)}"
     tail = f"In a fleet in which nothing changes, anything is flagged with a probability of {rate} at most."
     fits = len(rows(result, "fits"))
     if not moving and not out:
-        return f"Nothing changed beyond scatter in {fits} fits of {machines} machines. {tail}"
+        return f"Nothing changed beyond scatter in {fits} fits of {machines}. {tail}"
     drifting = _counted(len({(item["machine"], item["parameter"]) for item in moving}), "parameter drifts", "drift")
     standing = _counted(len({item["recording"] for item in out}), "fit stands out", "stand out")
-    return f"{fits} fits of {machines} machines: {drifting}, {standing}. {tail}"
+    return f"{fits} fits of {machines}: {drifting}, {standing}. {tail}"
 
 
 def _counted(count: int, one: str, verb: str) -> str:

@@ -53,7 +53,9 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     asked["diagnose"] = [str(write_case(folder / "lacking", axis(law="stribeck", tau_s=0.15, omega_s=6.0)))]
     for name, options in COMMANDS.items():
         assert main([name, *asked[name], *options, "--out", str(folder / name)]) == 0
-    return {name: (folder / name / "report.html").as_uri() for name in COMMANDS}
+    results = [str(folder / name) for name in ("bootstrap", "profile")]
+    assert main(["compare", *results, "--out", str(folder / "results")]) == 0
+    return {name: (folder / name / "report.html").as_uri() for name in (*COMMANDS, "results")}
 
 
 def assert_accessible(page: Page) -> None:
@@ -83,7 +85,7 @@ def assert_fits(page: Page) -> None:
     assert page.evaluate("() => document.documentElement.scrollWidth <= window.innerWidth + 1")
 
 
-@pytest.mark.parametrize("kind", COMMANDS)
+@pytest.mark.parametrize("kind", [*COMMANDS, "results"])
 @pytest.mark.parametrize("width", [1200, 390], ids=["desktop", "phone"])
 def test_every_kind_of_report_opens(kind: str, width: int, reports: dict[str, str], page: Page) -> None:
     """Without network or complaint, accessible, on a desktop and on a phone."""
