@@ -14,7 +14,7 @@ from friction_ocp.problem_file.check import check, check_file, check_rest
 from friction_ocp.problem_file.document import Document, read_document
 from friction_ocp.problem_file.salvage import read_section, salvage
 from friction_ocp.problem_file.schema import ProblemSection
-from friction_ocp.recording.hdf5 import is_static_points, read_recording, read_static_points
+from friction_ocp.recording.hdf5 import read_either
 from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.static_points import StaticPoints
 
@@ -104,7 +104,7 @@ def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, Use]], list
 
 def _read(path: Path) -> Recording | StaticPoints | FrictionOcpError:
     try:
-        return read_static_points(path) if is_static_points(path) else read_recording(path)
+        return read_either(path)
     except FrictionOcpError as error:
         return error
 

@@ -127,6 +127,8 @@ def _encoding(path: Path) -> str:
 def _split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
+    if len(line) > csv.field_size_limit():  # no row of a table, and more than the parser takes
+        return []
     return [cell.strip() for row in csv.reader([line], delimiter=delimiter, skipinitialspace=True) for cell in row]
 
 

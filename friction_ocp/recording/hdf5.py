@@ -22,6 +22,8 @@ from friction_ocp.recording.checks import (
     check_values,
     check_written_names,
 )
+from friction_ocp.recording.foreign import MAX_SAMPLES
+from friction_ocp.recording.probe import probed
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
 from friction_ocp.recording.result_series import RecordingSeries, datasets_of, series_of
 from friction_ocp.recording.static_points import COLUMNS, StaticPoints
@@ -32,13 +34,25 @@ h5py: Any = _h5py  # its own types are incomplete
 RECORDING_FORMAT = "friction-ocp-recording/1"
 STATIC_FORMAT = "friction-ocp-static/1"
 SERIES_FORMAT = "friction-ocp-series/1"
-MAX_ELEMENTS = 200_000_000
+_DAMAGE = (KeyError, OSError, RuntimeError, ValueError, TypeError, OverflowError, MemoryError)
+"""What h5py raises about damaged files."""
 _PROVENANCE = ("title", "source", "licence")
 _ASSUMED_UNITS = {"direction": "1", "runs": "1"}
 
 
+@probed
 def read_recording(path: str | Path) -> Recording:
     """Read a recording into SI units; raises FrictionOcpError with everything that is wrong with the file."""
+    return _read_recording(path)
+
+
+@probed
+def read_static_points(path: str | Path) -> StaticPoints:
+    """Read static points into SI units; raises FrictionOcpError with everything that is wrong with the file."""
+    return _read_static_points(path)
+
+
+def _read_recording(path: str | Path) -> Recording:
     path = Path(path)
     channels: dict[str, Channel] = {}
     with _reading(path, RECORDING_FORMAT) as reader:
@@ -73,8 +87,7 @@ def write_recording(recording: Recording, path: str | Path) -> None:
             _write_dataset(file, f"/channels/{name}", channel.values, attributes)
 
 
-def read_static_points(path: str | Path) -> StaticPoints:
-    """Read static points into SI units; raises FrictionOcpError with everything that is wrong with the file."""
+def _read_static_points(path: str | Path) -> StaticPoints:
     path = Path(path)
     with _reading(path, STATIC_FORMAT) as reader:
         columns: dict[str, FloatArray] = {}
@@ -94,12 +107,20 @@ def read_static_points(path: str | Path) -> StaticPoints:
     return points
 
 
+@probed
+def read_either(path: str | Path) -> Recording | StaticPoints:
+    """Read a recording, or static points where the file says that it holds them."""
+    return _read_static_points(path) if is_static_points(path) else _read_recording(path)
+
+
 def is_static_points(path: str | Path) -> bool:
     """Return whether a file says that it holds static points; False also where it cannot be read."""
+    if not Path(path).is_file():  # reading a pipe would wait for ever
+        return False
     try:
         with h5py.File(path, "r") as file:
             stated = file.attrs.get("format", "")
-    except OSError:
+    except _DAMAGE:
         return False
     return str(stated.decode() if isinstance(stated, bytes) else stated) == STATIC_FORMAT
 
@@ -121,6 +142,7 @@ def write_result_series(path: str | Path, series: Mapping[str, RecordingSeries])
             _write_dataset(file, "/".join(names), values, {"unit": unit})
 
 
+@probed
 def read_result_series(path: str | Path) -> dict[str, RecordingSeries]:
     """Read back what `write_result_series` wrote."""
     with _reading(Path(path), SERIES_FORMAT) as reader:
@@ -202,8 +224,8 @@ class _Reader:
             self.report(f"{label} is not numeric but {node.dtype}", "real numbers, NaN where a sample is missing")
         elif len(node.shape or ()) != 1:
             self.report(f"{label} has the shape {node.shape}", "one value per sample")
-        elif node.size > MAX_ELEMENTS:
-            self.report(f"{label} declares {node.size} samples", f"at most {MAX_ELEMENTS}", "split the recording")
+        elif node.size > MAX_SAMPLES:
+            self.report(f"{label} declares {node.size} samples", f"at most {MAX_SAMPLES}", "split the recording")
         if len(self.findings) > count:
             return None
         try:
@@ -270,11 +292,17 @@ def _reading(path: Path, expected: str) -> Generator[_Reader]:
         raise FrictionOcpError(Finding(where, what, remedy="it may be damaged; copy it again")) from error
     with file:
         reader = _Reader(file, where)
-        found = reader.text(file, "format")
-        if found != expected:
-            what = f"attribute format is '{found}'" if found else "there is no attribute format"
-            reader.report(what, f"'{expected}' is read here")
-        yield reader
+        try:
+            found = reader.text(file, "format")
+            if found != expected:
+                what = f"attribute format is '{found}'" if found else "there is no attribute format"
+                reader.report(what, f"'{expected}' is read here")
+            yield reader
+        except FrictionOcpError:
+            raise
+        except _DAMAGE as error:
+            what = f"the file cannot be read ({' '.join(str(error).split())})"
+            raise FrictionOcpError(Finding(where, what, remedy="it is damaged; copy it again")) from error
     _raise(reader.findings)
 
 

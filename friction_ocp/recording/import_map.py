@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,8 @@ import yaml
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import dimension_of, to_si
 
+MAX_CHARACTERS = 500_000
+MAX_BRACKETS = 20
 MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
 _KEYS = ("format", "time", "channels", *_TEXTS)
@@ -61,9 +64,13 @@ def load_import_map(path: str | Path) -> ImportMap:
     """Read a map from YAML; raises FrictionOcpError with everything that is wrong with it."""
     where = str(path)
     try:
-        content: object = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        _refuse_monsters(text, where)
+        content: object = yaml.safe_load(text)
     except FileNotFoundError as error:
         raise FrictionOcpError(Finding(where, "there is no such map", remedy="correct the path")) from error
+    except RecursionError as error:
+        raise FrictionOcpError(Finding(where, "this is nested too deeply")) from error
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise FrictionOcpError(Finding(where, f"this is not YAML ({' '.join(str(error).split())})")) from error
     reader = _MapReader(where)
@@ -71,6 +78,14 @@ def load_import_map(path: str | Path) -> ImportMap:
     if result is None or reader.findings:
         raise FrictionOcpError(reader.findings)
     return result
+
+
+def _refuse_monsters(text: str, where: str) -> None:
+    """Refuse what would keep the parser busy for long: maps are short and flat."""
+    if len(text) > MAX_CHARACTERS:
+        raise FrictionOcpError(Finding(where, f"the map has {len(text)} characters", f"at most {MAX_CHARACTERS}"))
+    if re.search(r"[\[{]\s*" * MAX_BRACKETS, text):
+        raise FrictionOcpError(Finding(where, "this is nested too deeply"))
 
 
 @dataclass

@@ -14,6 +14,7 @@ from friction_ocp.recording.matlab import open_matlab
 from friction_ocp.recording.matlab_hdf5 import open_hdf5
 from friction_ocp.recording.mdf import open_mdf
 from friction_ocp.recording.parquet import open_parquet
+from friction_ocp.recording.probe import probed
 from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.rosbag import open_rosbag
 from friction_ocp.recording.table import recording_of
@@ -38,6 +39,7 @@ READERS: Mapping[str, Opener] = {
 """Reader by the suffix of the file; a further format is a further line."""
 
 
+@probed
 def import_recording(path: str | Path, map_path: str | Path) -> Recording:
     """Read a foreign file by a map; raises FrictionOcpError for an unknown format and with all that is wrong."""
     path = Path(path)
@@ -48,6 +50,7 @@ def import_recording(path: str | Path, map_path: str | Path) -> Recording:
         return recording_of(file, import_map, path)
 
 
+@probed
 def inspect_file(path: str | Path) -> str:
     """Return what a foreign file holds, one line a signal with its unit, rate, length and range."""
     path = Path(path)

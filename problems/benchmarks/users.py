@@ -10,7 +10,7 @@ import fleet
 import jobs
 import kills
 from checks import Check
-from servo import ROOT
+from servo import ROOT, script_check
 
 
 def batches(line: str, quick: bool) -> Check:
@@ -33,9 +33,32 @@ def kills_and_resumes(line: str, quick: bool) -> Check:
     return kills.check(line, 4) if quick else kills.check(line)
 
 
+def fuzzing(line: str, quick: bool) -> Check:
+    """Spoil files of every format; hostile ones are tests."""
+    spoilt = script_check(line, "fuzz.py", *(("--inputs", "50") if quick else ()))
+    hostile = tests_check(line, "tests/hostile")
+    return Check(line, f"{spoilt.measured}\n{hostile.measured}", bool(spoilt.passed and hostile.passed))
+
+
+def formats(line: str, quick: bool) -> Check:
+    """Run the tests of all formats, and the servo's fit in MuJoCo."""
+    priced = script_check(line, "formats.py", *(("--quick",) if quick else ()))
+    tested = tests_check(line, "tests/recording/test_foreign.py", "tests/recording/test_csv.py", "tests/export")
+    return Check(line, f"{priced.measured}\n{tested.measured}", bool(priced.passed and tested.passed))
+
+
+def tests_check(line: str, *paths: str) -> Check:
+    """Run tests of the repository; what is measured is pytest's last line."""
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-o", "addopts=", "-q", *paths]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    return Check(line, f"{' '.join(paths)}: {run.stdout.strip().splitlines()[-1]}", run.returncode == 0)
+
+
 MEASURES: Mapping[str, Callable[[str, bool], Check]] = {
+    "formats": formats,
     "cluster": clusters,
     "kills": kills_and_resumes,
+    "fuzzing": fuzzing,
     "batch": batches,
 }
 """By ID in done_when.yaml."""
