@@ -23,7 +23,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("statistics",),
     ("diagnosis", "problem_file", "plots", "result_document", "progress_bar"),
     ("design",),
-    ("report", "statistics_document", "diagnosis_document", "design_document", "fleet", "export"),
+    ("report", "statistics_document", "diagnosis_document", "design_document", "fleet", "export", "drafts"),
     ("result_folder", "fleet_document"),
     ("diagnosis_folder", "design_folder", "fleet_folder"),
     ("repetition",),

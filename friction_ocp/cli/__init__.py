@@ -6,7 +6,17 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from friction_ocp.cli import checking, diagnosing, exporting, fitting, fleets, importing, repeating, statistics
+from friction_ocp.cli import (
+    checking,
+    diagnosing,
+    drafting,
+    exporting,
+    fitting,
+    fleets,
+    importing,
+    repeating,
+    statistics,
+)
 from friction_ocp.cli.options import DONE, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT, Parser
 from friction_ocp.errors import FrictionOcpError
 
@@ -39,6 +49,6 @@ def _parser() -> Parser:
         epilog="Exit status: 0 done, 1 the input is wrong, 2 the solver did not converge, 3 interrupted.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for group in (checking, fitting, diagnosing, statistics, fleets, repeating, importing, exporting):
+    for group in (checking, fitting, diagnosing, statistics, fleets, repeating, importing, exporting, drafting):
         group.add_commands(commands)
     return parser

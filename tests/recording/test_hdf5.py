@@ -223,7 +223,7 @@ FINDINGS: list[tuple[Edit, str]] = [
     (link_out("/channels/bad"), ": /channels/bad is a link out of the file or in a circle"),
     (link_out("/nowhere"), ": there is no /channels/bad"),
     (virtual, ": channel 'bad' keeps its data in other files"),
-    (huge, ": channel 'bad' declares 300000000 samples; at most 200000000; split the recording"),
+    (huge, ": channel 'bad' declares 300000000 samples; at most 50000000; split the recording"),
 ]
 
 

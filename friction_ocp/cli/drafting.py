@@ -1,0 +1,59 @@
+"""`init`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from friction_ocp.cli.options import DONE
+from friction_ocp.errors import Finding, FrictionOcpError
+
+MODELS = (".xml", ".mjcf", ".urdf")
+
+
+def add_commands(commands: Any) -> None:
+    """Add `init` to the parser."""
+    drafting = commands.add_parser("init", help="write the first draft of a problem file")
+    drafting.add_argument("source", nargs="?", help="template, or a model in MJCF or URDF; asked for without it")
+    drafting.add_argument("--joint", help="joint of the model")
+    drafting.add_argument("--recordings", type=Path, default=Path(), help="folder of the recordings; default here")
+    drafting.add_argument("--out", type=Path, default=Path("problem.yaml"), help="file to write; default problem.yaml")
+    drafting.set_defaults(run=_init)
+
+
+def _init(options: argparse.Namespace) -> int:
+    from friction_ocp.drafts.draft import write_draft
+    from friction_ocp.drafts.recorded import recordings_of
+
+    axis = _axis(options)
+    recorded = recordings_of(options.recordings, axis)
+    write_draft(axis, recorded, options.out)
+    print(
+        f"Written: {options.out}, with {len(recorded.train)} recordings to fit and {len(recorded.validation)} to judge"
+    )
+    for name, channel in recorded.channels.items():
+        print(f"  {name}: {channel['measures']}")
+    if recorded.left_out:
+        print(f"Not used: {', '.join(recorded.left_out)}")
+    print(f"Edit it, then: friction-ocp check {options.out}")
+    return DONE
+
+
+def _axis(options: argparse.Namespace) -> Any:
+    """Return the axis of a model, a template, or of answers on the terminal."""
+    from friction_ocp.drafts.axis import TEMPLATES, template
+    from friction_ocp.drafts.model_joint import axis_of_joint
+    from friction_ocp.drafts.questions import axis_of_answers
+
+    if options.source is None:
+        if not sys.stdin.isatty():
+            allowed = f"a template ({', '.join(TEMPLATES)}), or a model in MJCF or URDF"
+            raise FrictionOcpError(Finding("init", "nothing is named, and there is no terminal to ask on", allowed))
+        return axis_of_answers(input)
+    if Path(options.source).suffix.lower() in MODELS:
+        return axis_of_joint(Path(options.source), options.joint)
+    if options.joint is not None:
+        raise FrictionOcpError(Finding("init", "--joint stands beside a template", "a model in MJCF or URDF"))
+    return template(options.source)
