@@ -389,7 +389,7 @@ HOSTILE: dict[str, tuple[Make, str]] = {
     ),
     "MATLAB that kills": (
         log("log.mat", (DATA / "crash.mat").read_bytes()),
-        "reading it ends with signal 11; the file may be damaged; copy it again",
+        "the file may be damaged; copy it again",
     ),
     "Parquet without its footer": (log("log.parquet", parquet_of_lies), "this cannot be read as a Parquet file ("),
     "ROS bag of another place": (log("bag", rosbag_elsewhere), "this cannot be read as a ROS bag ("),
