@@ -12,6 +12,7 @@ from friction_ocp.design.next_experiment import FollowUp
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
+from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.select import Rival, probabilities
@@ -141,7 +142,7 @@ def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
 
 
 def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[str, Any]:
-    known = set(item.before.values)
+    own = _own(item.before, rival.fitted)
     return {
         **_named(rival.key),
         "probability": chance,
@@ -149,8 +150,17 @@ def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[s
         "refit_gain": _share(item.before.objective - rival.fitted.objective, available),
         "heldout_gain": _share(float(np.sum(rival.gains)), available),
         "p_value": rival.screened.p_value,
-        "parameters": {name: value for name, value in rival.fitted.values.items() if name not in known},
+        "parameters": {name: value for name, value in rival.fitted.values.items() if name in own},
     }
+
+
+def _own(before: FittedModel, fitted: FittedModel) -> set[str]:
+    """Return the parameters that an addition brings: new ones, or those whose stated values it takes back."""
+    new = set(fitted.values) - set(before.values)
+    if new:
+        return new
+    stated = [dict(zip(item.space.names, item.space.prior_std, strict=True)) for item in (before.model, fitted.model)]
+    return {name for name, std in stated[0].items() if math.isfinite(std) and not math.isfinite(stated[1][name])}
 
 
 def _samples(item: Round) -> int:
@@ -166,7 +176,7 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     """Return the final values of what an accepted effect added."""
     done = next(item for item in diagnosis.rounds if item.accepted is not None and item.accepted.key == key)
     assert done.accepted is not None
-    names = set(done.accepted.fitted.values) - set(done.before.values)
+    names = _own(done.before, done.accepted.fitted)
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values

@@ -18,6 +18,7 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
+from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -35,7 +36,7 @@ WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
 FINISHED, CLOSE = 2, 1.5
 """Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
-this factor; of free runs, whose fits end late, all."""
+this factor."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 
@@ -147,7 +148,9 @@ def diagnose(
             keys = [*accepted, done.accepted.key]
             current, accepted = _reexamined(base, done.accepted.fitted, keys, level, rng)
             bench = bench.at(current)
-    current = bench.current
+    current, checked = _checked(bench.current, level)
+    rounds += checked
+    accepted += [item.accepted.key for item in checked if item.accepted is not None]
     rows = current.linear.rows
     return Diagnosis(
         problem=problem,
@@ -162,6 +165,23 @@ def diagnose(
         slow=slow_torques(current, clues_of(current)),
         seconds=time.perf_counter() - began,
     )
+
+
+def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Round]]:
+    """Take back stated values that the model, once it leaves nothing but noise, contradicts.
+
+    Before that they may be far off because they stand in for what is missing.
+    """
+    rounds = list[Round]()
+    for _ in range(MOST_ROUNDS):
+        power = excess(current.linear.rows, blocks_of(current.linear.rows))
+        found = [] if power.significant(level) else contradictions(current)
+        if not found:
+            break
+        fitted, choice = released(current, found[0])
+        rounds.append(Round((), choice, current, power, choice.rivals[0]))
+        current = fitted
+    return current, rounds
 
 
 def _reexamined(
@@ -244,9 +264,8 @@ def _rivals(crew: Crew, shortlist: Sequence[Screened]) -> list[Rival]:
     ]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
     worst = sorted(hopes)[:count][-1]
-    free_run = current.footing.segment_s is None
     pairs = zip(shortlist, refits, strict=True)
-    kept = [pair for pair, hope in zip(pairs, hopes, strict=True) if free_run or hope <= worst]
+    kept = [pair for pair, hope in zip(pairs, hopes, strict=True) if hope <= worst]
     return crew.rivals(kept, without)
 
 
