@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import importlib
 import re
 import tomllib
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
+import yaml
 from servo_problem import REPOSITORY, servo_document, write_problem
 
 from friction_ocp.cli import _parser
+from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.drive.parts import Channel, Controller, ControllerType, Gravity, Motor, Shaft, Transmission
+from friction_ocp.effects import registry as effect_registry
 from friction_ocp.estimation.estimate import simulate
 from friction_ocp.friction import registry
 from friction_ocp.friction.element import FrictionElement
@@ -97,6 +101,25 @@ def test_the_law_that_it_adds_needs_one_class_and_one_line(tmp_path: Path, monke
     assert [str(finding) for finding in check(problem) if finding.severity == "error"] == []
     simulation = simulate(problem)
     assert simulation.train_errors["position"][0].rms < 1.0
+
+
+def test_the_effect_that_it_adds_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Registered, the effect of the README, 15 lines at most, is named where the plant rubs and its size found."""
+    example = blocks("python")[2]
+    assert len(example[example.index("class") :].splitlines()) <= 15
+    names: dict[str, Any] = {"__name__": "rubbing"}
+    exec(compile(example, "README.md", "exec", dont_inherit=True), names)
+    monkeypatch.setattr(effect_registry, "BUILT_IN", (*effect_registry.BUILT_IN, names["RubbingEffect"]))
+    monkeypatch.syspath_prepend(str(REPOSITORY / "tests" / "diagnosis"))
+    cases = importlib.import_module("diagnosis_cases")
+    path = cases.write_case(tmp_path, cases.axis(viscous=0.0))
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["friction"] = {"law": "none"}
+    document["diagnosis"]["effects"] = ["rubbing", "sensor_delay"]
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    found = diagnose(load_problem(path))
+    assert found.accepted == (("rubbing", "motor"),)
+    assert found.final.values["motor.friction.tau_c"] == pytest.approx(cases.COULOMB, rel=0.02)
 
 
 def test_the_map_that_it_shows_is_read(tmp_path: Path) -> None:
