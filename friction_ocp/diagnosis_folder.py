@@ -34,7 +34,8 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
     path = diagnosis.problem.path
     if path is not None:
         for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
-            text = write_problem(path, fitted.model.problem.drive, fitted.values, target, fitted.model.max_step)
+            drive, source = fitted.model.problem.drive, diagnosis.problem.text
+            text = write_problem(path, drive, fitted.values, target, fitted.model.max_step, source)
             write_text(target / name, text)
     if following is not None and following.option is not None:
         write_recording(following.option.run.recording, target / "next_experiment.h5")

@@ -46,7 +46,7 @@ def fitted_problem(estimate: Estimate, folder: Path) -> str | None:
     if path is None:
         return None
     try:
-        return dump_problem(path, estimate.values, folder, estimate.simulation.max_step)
+        return dump_problem(path, estimate.values, folder, estimate.simulation.max_step, estimate.problem.text)
     except FrictionOcpError:  # parameters that were added after the file was read
         return None
 

@@ -18,7 +18,9 @@ from friction_ocp.cli import DONE, WRONG_INPUT, main
 from friction_ocp.parameters import Free
 
 sys.path.insert(0, str(Path(__file__).parent / "fleet"))
+sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
 
+from diagnosis_cases import axis, write_case
 from simulated_fleet import write_axis, write_fleet
 
 
@@ -121,6 +123,21 @@ def test_a_changed_problem_file_is_named_and_not_used(copied: Path) -> None:
     status, found = rerun(copied)
     assert status == DONE and found["agrees"]
     assert found["changed"] == [f"{path} is another file now; the copy in the result was used"]
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_a_problem_file_that_is_gone_is_not_missed(command: str, tmp_path: Path) -> None:
+    """The result holds it; recordings are found from where it lay, and fitted problems are written from the copy."""
+    problem = write_case(tmp_path, axis())
+    options = [] if command == "identify" else ["--workers", "1"]
+    assert main([command, str(problem), "--out", str(tmp_path / "out"), *options]) == DONE
+    problem.unlink()
+    status, found = rerun(tmp_path)
+    assert (status, found["differences"]) == (DONE, [])
+    assert found["changed"] == [f"{problem} is gone; the copy in the result was used"]
+    name = "fitted.yaml" if command == "identify" else "base.yaml"
+    ours, theirs = ((tmp_path / out / name).read_text(encoding="utf-8") for out in ("again", "out"))
+    assert ours == theirs
 
 
 def test_a_changed_recording_is_named_and_the_numbers_differ(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,18 +19,23 @@ _DIRECTIONS = ("positive", "negative")
 
 
 def dump_problem(
-    source: str | Path, values: Mapping[str, float], folder: str | Path, max_step: float | None = None
+    source: str | Path,
+    values: Mapping[str, float],
+    folder: str | Path,
+    max_step: float | None = None,
+    text: str = "",
 ) -> str:
     """Return the text of a problem file for `folder`: the file `source` with fitted values as its guesses.
 
     Bounds stay, and a prior stays where it was: its mean is written out. The value of one recording, named
     `path@recording`, becomes a `set` beside its file, the guess being left alone. Paths of recordings are written
     relative to `folder`. `max_step` s is the integrator step that the values belong to, unless the file states one.
+    `text` is the file as it was read, if that is known: it may have changed since.
     Comments other than those at the head are lost. Raises FrictionOcpError for a name that is
     not fitted in the file.
     """
     source = Path(source)
-    document = read_document(source)
+    document = read_document(source, text or None)
     section, faults = read_section(document.content)
     if section is None:
         raise FrictionOcpError([fault.finding(str(source)) for fault in faults])

@@ -21,15 +21,21 @@ _APART = ("drive", "controller", "channels")
 
 
 def write_problem(
-    source: str | Path, drive: Drive, values: Mapping[str, float], folder: str | Path, max_step: float | None = None
+    source: str | Path,
+    drive: Drive,
+    values: Mapping[str, float],
+    folder: str | Path,
+    max_step: float | None = None,
+    text: str = "",
 ) -> str:
     """Return the text of a problem file for `folder`: the file `source` with another drive, its guesses replaced.
 
     `values` are fitted values by parameter name; the value of one recording, named `path@recording`, becomes a `set`
-    beside its file. Paths of recordings are written relative to `folder`.
+    beside its file. Paths of recordings are written relative to `folder`. `text` is the file as it was read, if that is
+    known: it may have changed since.
     """
     source = Path(source)
-    document = read_document(source)
+    document = read_document(source, text or None)
     content = copy_content(document.content)
     written = drive_content(drive, values)
     fresh: dict[str, Any] = {}
