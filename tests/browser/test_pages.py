@@ -24,6 +24,7 @@ COMMANDS: dict[str, list[str]] = {
     "compare": ["--workers", "1"],
     "batch": ["--workers", "1"],
     "diagnose": ["--workers", "1"],
+    "design": [],
 }
 SAMPLES, MOST_BYTES, MOST_SECONDS = 1_000_000, 15_000_000, 2.0
 SPIKE = 7.5
@@ -50,7 +51,9 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     asked = {name: [str(problem)] for name in COMMANDS}
     asked["compare"] = [str(problem), str(other)]
     asked["batch"] = [str(problem), str(folder / "nights")]
-    asked["diagnose"] = [str(write_case(folder / "lacking", axis(law="stribeck", tau_s=0.15, omega_s=6.0)))]
+    asked["diagnose"] = asked["design"] = [
+        str(write_case(folder / "lacking", axis(law="stribeck", tau_s=0.15, omega_s=6.0)))
+    ]
     for name, options in COMMANDS.items():
         assert main([name, *asked[name], *options, "--out", str(folder / name)]) == 0
     results = [str(folder / name) for name in ("bootstrap", "profile")]
