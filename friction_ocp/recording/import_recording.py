@@ -1,4 +1,7 @@
-"""Import of foreign formats: which reader takes which file."""
+"""Import of foreign formats: which reader takes which file.
+
+Delimited text is read here alone; what libraries of others read is read in a child process first.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +42,13 @@ READERS: Mapping[str, Opener] = {
 """Reader by the suffix of the file; a further format is a further line."""
 
 
-@probed
 def import_recording(path: str | Path, map_path: str | Path) -> Recording:
     """Read a foreign file by a map; raises FrictionOcpError for an unknown format and with all that is wrong."""
+    read = _import if _opener(Path(path)) is open_csv else probed(_import)
+    return read(path, map_path)
+
+
+def _import(path: str | Path, map_path: str | Path) -> Recording:
     path = Path(path)
     opener, import_map = _opener(path), load_import_map(map_path)
     _refuse_missing(path)
@@ -50,9 +57,13 @@ def import_recording(path: str | Path, map_path: str | Path) -> Recording:
         return recording_of(file, import_map, path)
 
 
-@probed
 def inspect_file(path: str | Path) -> str:
     """Return what a foreign file holds, one line a signal with its unit, rate, length and range."""
+    read = _inspect if _opener(Path(path)) is open_csv else probed(_inspect)
+    return read(path)
+
+
+def _inspect(path: str | Path) -> str:
     path = Path(path)
     opener = _opener(path)
     _refuse_missing(path)

@@ -23,8 +23,8 @@ from friction_ocp.recording.foreign import free_memory
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-SECONDS, BYTES_PER_SECOND = 3, 10_000_000
-"""Processor time that a small file may take, and how much more a larger one gets."""
+SECONDS, BYTES_PER_SECOND = 6, 500_000
+"""Processor time of a small file, the library being loaded in it too, and how much more a larger one gets."""
 _SOUND, _REFUSED, _TOO_LARGE = 0, 1, 2
 
 
@@ -60,9 +60,16 @@ def _identity(read: Callable[..., object], path: Path) -> tuple[object, ...] | N
     return (read, path.absolute(), facts.st_ino, facts.st_size, facts.st_mtime_ns) if path.is_file() else None
 
 
+def _size(path: Path) -> int:
+    """Return the bytes of a file, or of all files in a folder."""
+    if path.is_dir():
+        return sum(_size(item) for item in path.iterdir() if item.is_file())
+    return path.stat().st_size if path.is_file() else 0
+
+
 def _probe(path: Path, read: Callable[[], object]) -> None:
     """Read in a child; raises FrictionOcpError if it did not come back."""
-    seconds = SECONDS + (path.stat().st_size // BYTES_PER_SECOND if path.is_file() else 0)
+    seconds = SECONDS + _size(path) // BYTES_PER_SECOND
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of forks beside threads: the child only reads a file
         child = os.fork()
