@@ -71,6 +71,8 @@ class FittedModel:
 def fit_base(model: Model) -> FittedModel:
     """Fit the base model from its guesses and lay the footing on which all models are compared."""
     rough = footing(model, model.space.guess)
+    if rough.segment_s is None and model.problem.estimation.loss == "squares":
+        return _free_base(model, rough)
     if rough.segment_s is None:
         fitted = fit(model)
         theta = fitted.solution.point.theta
@@ -83,6 +85,14 @@ def fit_base(model: Model) -> FittedModel:
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
     return freed(polished(model, foot, end.theta, nodes if foot.train is program.experiments else None))
+
+
+def _free_base(model: Model, rough: Footing) -> FittedModel:
+    """Fit free runs by squares from the guesses, and from where loosely joined segments lead; the better end counts."""
+    starts = [model.space.guess, _rough_answer(model)[1].theta]
+    best = min((polished(model, rough, theta, None, COARSE) for theta in starts), key=lambda end: end.objective)
+    foot = footing(model, best.theta)
+    return freed(polished(model, foot, best.theta, best.linear.point.nodes))
 
 
 def _rough_answer(model: Model) -> tuple[Program, Point]:
