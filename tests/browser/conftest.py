@@ -8,10 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 for folder in ("diagnosis", "fleet", "report"):
     sys.path.insert(0, str(Path(__file__).parents[1] / folder))
+
+expect.set_options(timeout=30_000)  # ms: a machine may have other work
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
