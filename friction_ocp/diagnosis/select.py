@@ -77,8 +77,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
     """Weigh rivals by their held-out gains; `level` is the significance asked for.
 
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
-    two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Rivals that
-    leave the same residuals share what they have together, fewer parameters taking more (Akaike 1973).
+    two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
+    parameter takes off a factor e beforehand (Akaike 1973); rivals that leave the same residuals share what they have.
     """
     if not rivals:
         return Choice((), (), 1.0, False, ())
@@ -90,7 +90,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
     ordered = [rivals[k] for k in order]
     best = totals[:, order[0] + 1]
     alone = bool(np.quantile(best, level) > 0)
-    aliases = ordered[: _needed([chances[k] for k in order])]
+    sure = _needed([chances[k] for k in order])
+    aliases = [rival for k, rival in enumerate(ordered[:sure]) if k == 0 or float(np.sum(rival.gains)) > 0]
     some = bool(shares[0] < level / len(rivals))
     return Choice(
         rivals=tuple(ordered),
@@ -114,6 +115,8 @@ def _shared(rivals: Sequence[Rival], shares: FloatArray) -> list[float]:
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
     weights = np.array([np.exp(-float(rival.fitted.theta.size + _blames_sensor(rival))) for rival in rivals])
+    weights = weights / weights.max()
+    shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
     found = list[float]()
     for k in range(len(rivals)):
         own = [j for j in range(len(rivals)) if owner[j] == owner[k]]
