@@ -61,7 +61,7 @@ class Contrast:
         extra = np.setdiff1d(np.arange(len(names)), shared)
         if extra.size:
             first = int(item.cut.first[0])
-            at = (own.smooth[first], own.rate[first], own.grid.at_node[first])
+            at = (own.smooth[first], own.rate[first], own.curvature[first], own.grid.at_node[first])
             nodes[0] = np.asarray(self.sweep.start.call([*at, numbers])[0]).ravel()
         nodes[:, shared] = item.nodes
         request = SweepRequest(own.grid, item.cut.first, nodes, numbers, width)

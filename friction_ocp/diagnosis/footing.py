@@ -99,7 +99,8 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     for begin, end in pairwise(edges):
         at = slice(begin, end + 1)
         grid = replace(item.grid, **{key: value[at] for key, value in vars(item.grid).items()})
-        found.append(replace(item, grid=grid, measured=item.measured[at], smooth=item.smooth[at], rate=item.rate[at]))
+        kept = {name: getattr(item, name)[at] for name in ("measured", "smooth", "rate", "curvature")}
+        found.append(replace(item, grid=grid, **kept))
     return found
 
 

@@ -9,17 +9,18 @@ import casadi as ca
 from friction_ocp.drive.coordinates import pick, prescribed_motion
 from friction_ocp.drive.mechanism import Mechanism, Motion, column
 from friction_ocp.drive.motors import commands, seen_by_controller
-from friction_ocp.drive.parts import Channel
+from friction_ocp.drive.parts import Channel, Shaft
+from friction_ocp.drive.torques import applied_torques
+from friction_ocp.friction.bristle import AbstractBristleLaw
+from friction_ocp.friction.static import NoFriction
 
 
-def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
-    """Return the state that measured motion suggests: no twist, bristles as deflected by steady motion."""
+def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
+    """Return the state that measured motion suggests: no twist, bristles as steady motion or a balance has them."""
     q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    deflections = [
-        shaft.friction.under(mech.surroundings(shaft, at)).steady_deflection(mech.shaft_speed(shaft.name, at))
-        for shaft in mech.bristles
-    ]
+    acceleration = _measured_accelerations(mech, dy, ddy)
+    deflections = [_deflection(mech, shaft, at, acceleration) for shaft in mech.bristles]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
     return ca.vertcat(
         pick(q, mech.angle_groups),
@@ -30,6 +31,40 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX) -> ca.SX:
         ca.SX.zeros(len(mech.looping)),
         column(memory),
     )
+
+
+def _deflection(mech: Mechanism, shaft: Shaft, at: Motion, acceleration: dict[int, Any]) -> Any:
+    """Return the deflection of steady motion; near rest the one that balances the torques on a rigid drive."""
+    element = shaft.friction.under(mech.surroundings(shaft, at))
+    omega = mech.shaft_speed(shaft.name, at)
+    steady, group = element.steady_deflection(omega), mech.topology.group_of[shaft.name]
+    alone = isinstance(element.law, AbstractBristleLaw) and _rubs_alone(mech, shaft)
+    if not alone or mech.topology.elastic or group in mech.prescribed or group not in acceleration:
+        return steady
+    torques = applied_torques(mech, at, 0.0)
+    driving = sum(mech.speed_ratio(name, at) * torques[name] for name in mech.topology.members(group))
+    inertia, ratio = mech.inertia(group, at), mech.speed_ratio(shaft.name, at)
+    driving -= mech.inertial_torque(group, at) + inertia * acceleration[group]
+    balance, trust = element.sticking_deflection(omega, driving / ratio, inertia / ratio**2)
+    return steady + trust * (balance - steady)
+
+
+def _rubs_alone(mech: Mechanism, shaft: Shaft) -> bool:
+    """Whether no other shaft that turns with this one has friction."""
+    group_of = mech.topology.group_of
+    others = [item for item in mech.drive.shafts if item != shaft and group_of[item.name] == group_of[shaft.name]]
+    return all(isinstance(item.friction.law, NoFriction) for item in others)
+
+
+def _measured_accelerations(mech: Mechanism, dy: ca.SX, ddy: ca.SX) -> dict[int, Any]:
+    """Return the accelerations of groups that a channel sees, from the second derivative of angles first."""
+    found: dict[int, Any] = {}
+    for signal, slopes in (("theta", ddy), ("omega", dy)):
+        for k, channel in enumerate(mech.drive.outputs):
+            group = mech.topology.group_of.get(channel.part)
+            if group is not None and channel.signal == signal:
+                found.setdefault(group, slopes[k] / channel.gain / mech.topology.speed_ratio[channel.part])
+    return found
 
 
 def _first_memory(mech: Mechanism, at: Motion, name: str) -> Any:

@@ -45,7 +45,7 @@ class SteppedDrive:
     `step(x, u, p, h, width) -> x` advances by `h` s under midpoint inputs `u`;
     `output(x, u, p, h, width) -> y` predicts the recorded output channels;
     `tick(x, u, p, kind) -> x` lets a sampled controller compute (kind 1) or apply (kind 2);
-    `start(y, dy, u, p) -> x` makes a state from smoothed output channels and their time derivatives.
+    `start(y, dy, ddy, u, p) -> x` makes a state from smoothed output channels and their first two time derivatives.
     """
 
     mechanism: Mechanism
@@ -267,7 +267,7 @@ def stepped(drive: Drive) -> SteppedDrive:
     groups = len(mech.topology.roots)
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
-    y, dy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy"))
+    y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
@@ -280,6 +280,6 @@ def stepped(drive: Drive) -> SteppedDrive:
         step=ca.Function("step", arguments, [maps["step"].solved()]),
         output=ca.Function("output", arguments, [maps["output"].solved()]),
         tick=tick,
-        start=ca.Function("start", [y, dy, u, p], [start_state(mech, y, dy)]),
+        start=ca.Function("start", [y, dy, ddy, u, p], [start_state(mech, y, dy, ddy)]),
         implicit={name: item.implicit(arguments) for name, item in maps.items() if item.unknowns},
     )

@@ -29,6 +29,8 @@ class Experiment:
     """(n, outputs) smoothed samples."""
     rate: FloatArray
     """(n, outputs) time derivatives of the smoothed samples."""
+    curvature: FloatArray
+    """(n, outputs) their second time derivatives."""
 
 
 def known_delay(channel: Channel) -> float:
@@ -59,8 +61,9 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         name=use.name,
         grid=grid,
         measured=np.column_stack(columns),
-        smooth=np.column_stack([value for value, _ in motions]),
-        rate=np.column_stack([rate for _, rate in motions]),
+        smooth=np.column_stack([value for value, _, _ in motions]),
+        rate=np.column_stack([rate for _, rate, _ in motions]),
+        curvature=np.column_stack([bend for _, _, bend in motions]),
     )
 
 
@@ -116,7 +119,8 @@ def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:
     return column
 
 
-def _smooth(grid: Grid, use: RecordingUse, name: str) -> tuple[FloatArray, FloatArray]:
+def _smooth(grid: Grid, use: RecordingUse, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     channel = use.recording.channels[name]
-    value, rate, _ = smooth_motion(channel.time, channel.values)
-    return np.interp(grid.time, channel.time, value), np.interp(grid.time, channel.time, rate)
+    motion = smooth_motion(channel.time, channel.values)
+    value, rate, bend = (np.interp(grid.time, channel.time, part) for part in motion)
+    return value, rate, bend

@@ -182,7 +182,8 @@ def _signals(problem: Problem, name: str) -> list[tuple[FloatArray, FloatArray]]
 
 def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment) -> FloatArray:
     numbers = space.numbers(space.guess, item.name)
-    value, _ = sweep.start.map(item.grid.time.size)(item.smooth.T, item.rate.T, item.grid.at_node.T, numbers)
+    signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
+    value, _ = sweep.start.map(item.grid.time.size)(*(signal.T for signal in signals), numbers)
     return np.asarray(value).T
 
 

@@ -108,7 +108,7 @@ class Program:
         """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""
         numbers, slope = self.space.numbers_and_slope(theta, item.name)
         many = self.sweep.start.map(len(nodes))
-        signals = (item.smooth, item.rate, item.grid.at_node)
+        signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
         value, by_active = many(*(signal[nodes].T for signal in signals), numbers)
         states, active = self.sweep.start.size1_out(0), len(self.space.active)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friction_ocp.estimation.curriculum import introduced, may_enter_in_turn
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
@@ -81,6 +82,10 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     Return the ends, best first. The full model then starts from several releases of what the simpler one leaves out.
     """
     conclusive = plan.conclusive and model.problem.estimation.loss == "squares"
+    if conclusive and plan.builder is joined and model.static and may_enter_in_turn(model):
+        in_turn = Fitted(*introduced(model, phases))
+        if is_sound(model, in_turn):
+            return [in_turn]
     if conclusive:
         at_once = _rounds(model, replace(plan, widths=plan.widths[-1:]), [model.space.guess], "direct fit", phases)
         if is_sound(model, at_once[0]):

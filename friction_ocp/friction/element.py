@@ -141,6 +141,24 @@ class FrictionElement:
         """Return the deflection of a bristle, or those of several, in steady motion, rounded at standstill."""
         return smooth_sign(omega, 0.1 * getattr(self.law.along("positive"), "omega_s", 1.0)) * self._bent(omega)
 
+    def sticking_deflection(self, omega: Any, torque: Any, inertia: Any) -> tuple[Any, Any]:
+        """Return the deflection at which one bristle holds a torque at a speed near rest, and how far that can be.
+
+        From `torque` = sigma0 z + sigma1 (omega - sigma0 |omega| z / g) + sigma2 omega, z within its reach at rest. The
+        second number falls from 1 at rest to 0 where the bristle forgets its deflection as fast as `inertia` swings on
+        it, sigma0 |omega| / g = sqrt(sigma0 / inertia), or slip takes half of the damping's share away.
+        """
+        (_, positive), (_, negative) = self._bristles()
+        speed, stiffness, damping = smooth_abs(omega), self._sigma(0, torque), self._sigma(1, torque)
+        reach = where(torque >= 0, positive.level(0.0), negative.level(0.0)) / stiffness
+        level = where(omega >= 0, positive.level(speed), negative.level(speed))
+        slip = damping * speed / level
+        pace = speed * (stiffness * inertia) ** 0.5 / level
+        kept = where(slip <= 0.5, 1.0 - 2.0 * slip, 0.0) * where(pace <= 1.0, 1.0 - pace, 0.0)
+        share = where(slip <= 0.5, 1.0 - slip, 0.5)
+        balance = (torque - (damping + self._sigma(2, omega)) * omega) / (stiffness * share)
+        return where(balance > reach, reach, where(balance < -reach, -reach, balance)), kept
+
     def bent_deflection(self, omega: Any) -> Any:
         """Return the deflection, or those of several bristles, that belongs to steady motion at `omega`."""
         return smooth_sign(omega, 0.0) * self._bent(omega)

@@ -30,7 +30,7 @@ class Sweep:
         self.drive = drive
         self.active = tuple(active)
         self.start = _start_with_slope(drive, self.active)
-        """(y, dy, u, p) -> start state and its derivative by the active numbers."""
+        """(y, dy, ddy, u, p) -> start state and its derivative by the active numbers."""
         self.kernel: AbstractKernel = compile_sweep(drive, self.active, values_only) or InterpretedKernel(
             drive, self.active
         )
@@ -107,7 +107,7 @@ def _pieces(requests: Sequence[SweepRequest], threads: int) -> list[tuple[int, i
 
 
 def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:
-    arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(4)]
+    arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(5)]
     value = drive.start.call(arguments, True, False)[0]
-    chosen = ca.vertcat(*[arguments[3][k] for k in active]) if active else ca.SX(0, 1)
+    chosen = ca.vertcat(*[arguments[4][k] for k in active]) if active else ca.SX(0, 1)
     return ca.Function("start", arguments, [ca.densify(value), ca.densify(ca.jacobian(value, chosen))])

@@ -174,7 +174,7 @@ def responses(seed: int) -> list[Recording]:
             (16.0, sign * 1.5e-3),
             (20.0, sign * 1.5e-3),
         )
-        made.append(closed_loop(f"moves_{direction}", "speed profile under the loop", seed, moves))
+        made.append(closed_loop(f"moves_{direction}", "speed profile under the loop", seed, moves, FAST_LOG))
         for name, speed in (("slow", 1.11e-4), ("fast", 3.90e-2)):
             level = corners((0.0, 0.0), (0.1, sign * speed), (20.0, sign * speed))
             made.append(closed_loop(f"{name}_{direction}", f"{speed:g} rad/s under the loop", seed, level))

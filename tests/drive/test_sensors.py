@@ -109,6 +109,6 @@ def test_a_start_sees_through_an_eccentric_sensor() -> None:
     theta, omega = 0.7, 3.0
     seen = theta + 0.02 * (np.cos(theta) - 1) - 0.03 * np.sin(theta)
     slope = 1 - 0.02 * np.sin(theta) - 0.03 * np.cos(theta)
-    state = np.asarray(bench.stepped.start([2 * seen], [2 * slope * omega], [], bench.numbers)).ravel()
+    state = np.asarray(bench.stepped.start([2 * seen], [2 * slope * omega], [0.0], [], bench.numbers)).ravel()
     third_order = 0.04**3
     assert state == pytest.approx([theta, omega], abs=third_order)

@@ -15,7 +15,7 @@ ROUNDING = 1e-12
 def started(bench: Bench, measured: dict[str, float], rates: dict[str, float], inputs: list[float]) -> dict[str, float]:
     """Return the start state by name."""
     y, dy = ([values.get(name, 0.0) for name in bench.stepped.output_names] for values in (measured, rates))
-    state = np.asarray(bench.stepped.start(y, dy, inputs, bench.numbers)).ravel()
+    state = np.asarray(bench.stepped.start(y, dy, [0.0] * len(y), inputs, bench.numbers)).ravel()
     return dict(zip(bench.stepped.state_names, state, strict=True))
 
 
@@ -39,6 +39,30 @@ def test_bristles_start_in_steady_motion(omega: float) -> None:
     state = started(Bench(drive_of(plant, {"drive.current": 0.0})), {}, {"motor.theta": omega}, [0.0])
     rounded_sign = 1e-5
     assert state["motor.friction.z"] == pytest.approx(0.1 / 200.0 if omega > 0 else -0.12 / 100.0, rel=rounded_sign)
+
+
+@pytest.mark.parametrize("torque, acceleration", [(0.05, 0.0), (-0.04, 0.0), (0.09, 3.0)])
+def test_at_rest_a_bristle_holds_what_drives_the_shaft(torque: float, acceleration: float) -> None:
+    """Its deflection balances the torque that does not accelerate the shaft, with the stiffness of its side."""
+    friction = PlantFriction("lugre", (0.1, 0.12), 0.15, 1.0, sigma0=(200.0, 100.0))
+    plant = Plant((PlantShaft("motor", 0.01, friction),), (), (PlantMotor("drive", "motor"),))
+    bench = Bench(drive_of(plant, {"drive.current": 0.0}))
+    bend = [acceleration if name == "motor.theta" else 0.0 for name in bench.stepped.output_names]
+    still = [0.0] * len(bend)
+    state = np.asarray(bench.stepped.start(still, still, bend, [torque], bench.numbers)).ravel()
+    deflection = state[bench.stepped.state_names.index("motor.friction.z")]
+    held = torque - 0.01 * acceleration
+    assert deflection == pytest.approx(held / (200.0 if held > 0 else 100.0), rel=1e-6)
+
+
+def test_a_bristle_at_rest_holds_no_more_than_breakaway() -> None:
+    """What noise of the acceleration asks for beyond its reach is cut off."""
+    friction = PlantFriction("lugre", (0.1, 0.12), 0.15, 1.0, sigma0=(200.0, 100.0))
+    plant = Plant((PlantShaft("motor", 0.01, friction),), (), (PlantMotor("drive", "motor"),))
+    bench = Bench(drive_of(plant, {"drive.current": 0.0}))
+    still = [0.0] * len(bench.stepped.output_names)
+    state = np.asarray(bench.stepped.start(still, still, still, [5.0], bench.numbers)).ravel()
+    assert state[bench.stepped.state_names.index("motor.friction.z")] == pytest.approx(0.15 / 200.0, rel=1e-3)
 
 
 def test_a_sampled_controller_starts_with_the_samples_of_steady_motion() -> None:

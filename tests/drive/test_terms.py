@@ -388,7 +388,7 @@ def test_a_load_sensor_starts_the_motor_behind_a_rigid_error() -> None:
     turn, (cosine, sine) = 2 * np.pi / ERROR_PERIOD, RIGID_ERROR
     slope = 1 / RATIO + turn * (sine * np.cos(turn * q) - cosine * np.sin(turn * q))
     theta = q / RATIO + wave(RIGID_ERROR, ERROR_PERIOD, q)
-    state = np.asarray(bench.stepped.start([theta], [slope * v], [0.0], bench.numbers)).ravel()
+    state = np.asarray(bench.stepped.start([theta], [slope * v], [0.0], [0.0], bench.numbers)).ravel()
     two_newton_steps = 2e-2
     assert state == pytest.approx([q, v], rel=two_newton_steps)
 

@@ -1,0 +1,77 @@
+"""Recordings let into a fit one after another, those that are nearly explained first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.stages import relaxed
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
+
+ENTRANCE = Tolerances(max_iterations=25)
+"""Of a fit that one more recording has just come into."""
+RENEWALS, WORTHWHILE = 10, 1e-4
+"""How often the fit of all begins anew, and what share of the objective that has to gain."""
+
+
+def may_enter_in_turn(model: Model) -> bool:
+    """Whether recordings can come in one by one: there are several, and every parameter is shared by them."""
+    return len(model.train) > 1 and not any("@" in name for name in model.space.names)
+
+
+def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:
+    """Fit relaxed segments of all recordings, let in one after another; static points take part from the first.
+
+    The next one is that whose short segments along the measured motion the parameters so far explain best: small
+    motion near rest comes before large motion that only right parameters follow.
+    """
+    theta, taken, left = model.space.guess, (), list(model.train)
+    while True:
+        left.sort(key=lambda item: _mismatch(model, item, theta), reverse=True)
+        taken = (*taken, left.pop())
+        program = relaxed(model, taken, 0.0, Squares())
+        watch = phases.begin(f"{len(taken)} of {len(model.train)} recordings")
+        start = Point(theta, program.suggested_nodes(theta))
+        end = solve_gauss_newton(program, start, ENTRANCE, watch)
+        theta = end.point.theta
+        if not left:
+            return _in_order(_renewed(program, end, phases), program, model)
+
+
+def _renewed(program: Program, end: Solution, phases: Phases) -> Solution:
+    """Begin anew where a few segments at kinks of the friction made the damping grow, which holds back all others."""
+    for k in range(RENEWALS):
+        if end.converged and end.smooth:
+            break
+        after = solve_gauss_newton(program, end.point, ENTRANCE, phases.begin(f"renewal {k + 1}"))
+        after = replace(after, iterations=end.iterations + after.iterations)
+        gained, end = end.objective - after.objective, after
+        if end.converged and gained <= WORTHWHILE * end.objective:
+            break
+    return end
+
+
+def _mismatch(model: Model, item: Experiment, theta: FloatArray) -> float:
+    """Return the cost of a recording over its samples where every segment starts along the measured motion."""
+    program = replace(relaxed(model, (item,), 0.0, Squares()), static=())
+    cost = program.objective(Point(theta, program.suggested_nodes(theta)))
+    return cost / max(int(np.isfinite(item.measured).sum()), 1)
+
+
+def _in_order(end: Solution, program: Program, model: Model) -> tuple[Solution, Program]:
+    """Return the fit with its recordings in the order of the problem."""
+    order = [next(k for k, other in enumerate(program.experiments) if other is item) for item in model.train]
+    nodes = tuple(end.point.nodes[k] for k in order)
+    placed = replace(
+        program,
+        experiments=tuple(program.experiments[k] for k in order),
+        segments=tuple(program.segments[k] for k in order),
+    )
+    return replace(end, point=Point(end.point.theta, nodes)), placed
