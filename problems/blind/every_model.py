@@ -37,7 +37,7 @@ def answer(problem: Problem) -> Pair | None:
 
 def _left_out(base: FittedModel, item: Screened) -> float:
     try:
-        cost = float(np.sum(held_out(completed(quick_refit(base, item.augmentation.drive, item.starts)))))
+        cost = float(np.sum(held_out(completed(quick_refit(base, item)))))
     except (FrictionOcpError, np.linalg.LinAlgError):
         return np.inf
     return cost if np.isfinite(cost) else np.inf
