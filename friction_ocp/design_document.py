@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from friction_ocp.design.design import Design, Option
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.result_document import heading, provenance
+from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-design/1"
 RECORDING = "excitation.h5"
@@ -33,7 +32,7 @@ def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str,
             name: {
                 "value": float(value),
                 "unit": units.get(name.partition("@")[0], ""),
-                "std_error_before": _number(float(error)),
+                "std_error_before": number(float(error)),
             }
             for name, value, error in zip(names, design.fitted.theta, design.std_errors, strict=True)
         },
@@ -52,12 +51,8 @@ def _option(design: Design, option: Option) -> dict[str, Any]:
         "motion": option.run.motion.name,
         "sentence": option.run.motion.sentence,
         "amplitude": option.run.amplitude,
-        "peaks": {key: _number(value) for key, value in option.run.peaks.items()},
-        "worth": _number(option.worth),
+        "peaks": {key: number(value) for key, value in option.run.peaks.items()},
+        "worth": number(option.worth),
         "power": option.power,
-        "std_errors": None if errors is None else {n: _number(float(e)) for n, e in zip(names, errors, strict=True)},
+        "std_errors": None if errors is None else {n: number(float(e)) for n, e in zip(names, errors, strict=True)},
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -11,7 +11,8 @@ from friction_ocp.design.design import Design
 from friction_ocp.design_document import RECORDING, design_document
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries
-from friction_ocp.result_folder import plain_arrays, write_text
+from friction_ocp.result_folder import plain_arrays
+from friction_ocp.whole_file import write_text
 
 
 def save_design(design: Design, between: list[tuple[str, str]], folder: str | Path) -> Path:

@@ -21,7 +21,7 @@ from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
-from friction_ocp.result_document import heading, provenance
+from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
 
@@ -90,8 +90,8 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
                 "channel": cell.channel,
                 "recording": cell.recording,
                 "regime": cell.regime,
-                "before": _number(cell.before),
-                "after": _number(cell.after),
+                "before": number(cell.before),
+                "after": number(cell.after),
             }
             for cell in cells
         ],
@@ -110,7 +110,7 @@ def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:
 
 def _curve(found: Shape) -> dict[str, Any]:
     columns = {"at": found.centre, "torque": found.torque, "lower": found.lower, "upper": found.upper}
-    numbers = {key: [_number(float(value)) for value in values] for key, values in columns.items()}
+    numbers = {key: [number(float(value)) for value in values] for key, values in columns.items()}
     return {"component": found.component, "variable": found.variable, **numbers}
 
 
@@ -129,7 +129,7 @@ def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
             "refit_gain": None,
             "heldout_gain": None,
             "p_value": seen.p_value,
-            "parameters": {path: _number(value) for path, value in seen.values.items()},
+            "parameters": {path: number(value) for path, value in seen.values.items()},
         }
         for seen in rest
     ]
@@ -208,9 +208,9 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
         "before": _table(diagnosis, diagnosis.before),
         "after": _table(diagnosis, diagnosis.after),
         "shrink": {
-            "overall": _number(closed.overall),
-            "interval95": [_number(end) for end in closed.interval95],
-            **{name: _number(value) for name, value in closed.by_channel.items()},
+            "overall": number(closed.overall),
+            "interval95": [number(end) for end in closed.interval95],
+            **{name: number(value) for name, value in closed.by_channel.items()},
         },
     }
 
@@ -221,9 +221,9 @@ def _table(diagnosis: Diagnosis, errors: FreeErrors) -> dict[str, Any]:
     ratios = np.sqrt(errors.ratios())
     return {
         name: {
-            "rms": _number(float(ratios[k]) * floors[name].std),
+            "rms": number(float(ratios[k]) * floors[name].std),
             "unit": units[name],
-            "noise_ratio": _number(float(ratios[k])),
+            "noise_ratio": number(float(ratios[k])),
             "noise_source": floors[name].source,
         }
         for k, name in enumerate(errors.channels)
@@ -236,7 +236,7 @@ def _bias(item: Bias) -> dict[str, Any]:
         "before": item.before,
         "after": item.after,
         "unit": item.unit,
-        "interval95": [_number(end) for end in item.interval95],
+        "interval95": [number(end) for end in item.interval95],
     }
 
 
@@ -252,7 +252,3 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
     lines.append(f"the catalogue: {', '.join(effects())}")
     return lines
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

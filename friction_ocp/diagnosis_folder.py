@@ -12,7 +12,8 @@ from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import run_series
-from friction_ocp.result_folder import plain_arrays, write_text
+from friction_ocp.result_folder import plain_arrays
+from friction_ocp.whole_file import write_text
 
 
 def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,7 +12,7 @@ from friction_ocp.fleet.drift import FEWEST
 from friction_ocp.fleet.judgement import Drift, Outlier, Series
 from friction_ocp.fleet.store import StoredFit, StoredParameter
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries
-from friction_ocp.result_document import heading, provenance
+from friction_ocp.result_document import heading, number, provenance
 from friction_ocp.simulation.grid import FloatArray
 
 FORMAT = "friction-ocp-batch/1"
@@ -83,7 +82,7 @@ def _machines(fleet: Fleet) -> dict[str, Any]:
         found[item.machine]["parameters"][item.parameter] = {
             "value": float(level.coefficients[0]),
             "unit": item.unit,
-            "std_error": _number(float(np.sqrt(level.covariance[0, 0]))) if level.freedom else None,
+            "std_error": number(float(np.sqrt(level.covariance[0, 0]))) if level.freedom else None,
             "interval95": None if ends is None else list(ends),
             "night_scatter": level.night_scatter,
             "fits": int(item.value.size),
@@ -108,7 +107,7 @@ def _drift(fleet: Fleet, item: Drift) -> dict[str, Any]:
         "before": before,
         "change": change,
         "interval95": None if ends is None else list(ends),
-        "relative": _number(change / abs(before)) if before else None,
+        "relative": number(change / abs(before)) if before else None,
     }
 
 
@@ -178,7 +177,3 @@ def _parameter(item: StoredParameter) -> Mapping[str, Any]:
         "interval95": None if item.low is None or item.high is None else [item.low, item.high],
         "verdict": item.verdict,
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

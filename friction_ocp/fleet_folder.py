@@ -7,7 +7,7 @@ from pathlib import Path
 
 from friction_ocp.fleet.batch import Fleet
 from friction_ocp.fleet_document import fleet_document, fleet_series
-from friction_ocp.result_folder import write_text
+from friction_ocp.whole_file import write_text
 
 
 def save_fleet(fleet: Fleet, folder: str | Path) -> Path:

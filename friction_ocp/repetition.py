@@ -21,12 +21,13 @@ from friction_ocp.fleet.batch import STORE, batch
 from friction_ocp.fleet_folder import save_fleet
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.result_document import provenance
-from friction_ocp.result_folder import save, write_text
+from friction_ocp.result_folder import save
 from friction_ocp.statistics.bootstrap import bootstrap
 from friction_ocp.statistics.compare import compare
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.multistart import multistart
 from friction_ocp.statistics.profile import profile
+from friction_ocp.whole_file import write_text
 
 FORMAT = "friction-ocp-rerun/1"
 TOLERANCE = 1e-3

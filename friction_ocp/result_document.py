@@ -28,7 +28,7 @@ FORMAT = "friction-ocp-result/1"
 SIMULATION_FORMAT = "friction-ocp-simulation/1"
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
     """Return a float that JSON can hold; None for NaN and infinity."""
     return float(value) if math.isfinite(value) else None
 
@@ -48,7 +48,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             "iterations": estimate.solver.iterations,
             "seconds": estimate.solver.seconds,
             "build_seconds": estimate.solver.build_seconds,
-            "objective": _number(estimate.solver.objective),
+            "objective": number(estimate.solver.objective),
             "starts": estimate.solver.starts,
         },
         "covariance": {
@@ -100,11 +100,11 @@ def heading(problem: Problem) -> dict[str, Any]:
 
 
 def _parameter(item: ParameterEstimate) -> dict[str, Any]:
-    low, high = (_number(end) for end in item.interval95)
+    low, high = (number(end) for end in item.interval95)
     return {
         "value": item.value,
         "unit": item.unit,
-        "std_error": _number(item.std_error),
+        "std_error": number(item.std_error),
         "interval95": None if low is None or high is None else [low, high],
         "guess": item.guess,
         "verdict": item.verdict.word,
@@ -139,8 +139,8 @@ def _static(item: StaticFit) -> dict[str, Any]:
         "split": item.split,
         "measures": item.effort,
         "unit": item.unit,
-        "rms": _number(item.rms),
-        "noise_ratio": _number(item.noise_ratio),
+        "rms": number(item.rms),
+        "noise_ratio": number(item.noise_ratio),
         "noise_source": item.noise_source,
         **{key: _numbers(getattr(item, key)) for key in ("speed", "measured", "predicted", "std_error")},
     }
@@ -148,11 +148,11 @@ def _static(item: StaticFit) -> dict[str, Any]:
 
 def _errors(errors: Errors) -> dict[str, float | None]:
     names = ("rms", "mae", "relative", "relative_norm", "noise_ratio")
-    return {name: _number(getattr(errors, name)) for name in names}
+    return {name: number(getattr(errors, name)) for name in names}
 
 
 def _numbers(values: FloatArray) -> list[float | None]:
-    return [_number(value) for value in values]
+    return [number(value) for value in values]
 
 
 def _matrix(values: FloatArray) -> list[list[float | None]]:
@@ -179,8 +179,8 @@ def _whiteness(test: Whiteness) -> dict[str, Any]:
     return {
         "lag_s": _numbers(test.lag_s),
         "autocorrelation": _numbers(test.autocorrelation),
-        "band": _number(test.band),
-        "p_value": _number(test.p_value),
+        "band": number(test.band),
+        "p_value": number(test.p_value),
         "white": test.white,
     }
 

@@ -13,15 +13,9 @@ from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
 from friction_ocp.statistics.compare import Comparison
 from friction_ocp.statistics_document import Statistic, statistic_document
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 Arrays = dict[str, dict[str, dict[str, Any]]]
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
-    with whole_file(path) as staged:
-        staged.write_text(text, encoding="utf-8")
 
 
 def save(result: Estimate | Simulation | Statistic, folder: str | Path) -> Path:

@@ -173,7 +173,7 @@ def save_side_by_side(document: Json, folder: Path) -> Path:
     from friction_ocp.plots.side_by_side import side_by_side_figure
     from friction_ocp.plots.style import figure_style, save
     from friction_ocp.report.side_by_side_page import write_side_by_side
-    from friction_ocp.result_folder import write_text
+    from friction_ocp.whole_file import write_text
 
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "result.json", json.dumps(document, indent=1, allow_nan=False))

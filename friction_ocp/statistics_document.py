@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from friction_ocp.result_document import estimate_document, problem_file, provenance
+from friction_ocp.result_document import estimate_document, number, problem_file, provenance
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.bootstrap import Bootstrap
 from friction_ocp.statistics.compare import Candidate, Comparison
@@ -73,7 +72,7 @@ def _start(end: StartEnd, names: Sequence[str]) -> dict[str, Any]:
     return {
         "start": _named(names, end.start),
         "end": None if solution is None else _named(names, solution.point.theta),
-        "objective": None if solution is None else _number(solution.objective),
+        "objective": None if solution is None else number(solution.objective),
         "converged": solution is not None and solution.converged,
         "message": end.error if solution is None else solution.message,
         "iterations": None if solution is None else solution.iterations,
@@ -107,7 +106,7 @@ def _profile(item: Profile) -> dict[str, Any]:
         "ends": list(item.ends),
         "value": item.parameter.value,
         "unit": item.parameter.unit,
-        "std_error": _number(item.parameter.std_error),
+        "std_error": number(item.parameter.std_error),
         "scale": item.scale,
         "points": [
             {"value": float(value), "ratio": float(ratio), "parameters": theta.tolist(), "converged": converged}
@@ -145,7 +144,7 @@ def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
                     "value": item.value,
                     "unit": item.unit,
                     "std_error": float(std_error),
-                    "covariance_std_error": _number(item.std_error),
+                    "covariance_std_error": number(item.std_error),
                     "median": float(percentiles[1]),
                     "interval95": [float(percentiles[0]), float(percentiles[2])],
                 }
@@ -207,10 +206,10 @@ def _model(item: Candidate, among: Sequence[Candidate]) -> dict[str, Any]:
         "status": document["status"],
         "fitted": len(item.estimate.parameters),
         "log_likelihood": scores.log_likelihood,
-        "aicc": _number(scores.aicc),
+        "aicc": number(scores.aicc),
         "bic": scores.bic,
         "held_out": scores.held_out,
-        "delta_aicc": _number(scores.aicc - min(other.aicc for other in others)),
+        "delta_aicc": number(scores.aicc - min(other.aicc for other in others)),
         "delta_bic": scores.bic - min(other.bic for other in others),
         "train": document["fit"]["train"],
         "validation": document["fit"]["validation"],
@@ -220,7 +219,3 @@ def _model(item: Candidate, among: Sequence[Candidate]) -> dict[str, Any]:
 
 def _named(names: Sequence[str], values: FloatArray) -> Mapping[str, float]:
     return {name: float(value) for name, value in zip(names, np.asarray(values), strict=True)}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -18,3 +18,9 @@ def whole_file(path: Path) -> Generator[Path]:
         staged.replace(path)
     finally:
         staged.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all: a reader sees the old file or the whole new one."""
+    with whole_file(path) as staged:
+        staged.write_text(text, encoding="utf-8", newline="\n")

@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[1] / "friction_ocp"
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("errors", "whole_file"),
-    ("execution",),
+    ("execution", "optional_library"),
     ("quantities", "parameters", "expressions", "dae"),
     ("friction",),
     ("drive",),

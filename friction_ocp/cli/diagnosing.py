@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from typing import Any
 
-from friction_ocp.cli.options import DONE, add_job, add_workers, checked, executor, output_folder
+from friction_ocp.cli.options import DONE, add_job, add_workers, checked, executor, output_folder, show
 
 SECONDS_BETWEEN_LINES = 2.0
 
@@ -38,12 +37,7 @@ def _diagnose(options: argparse.Namespace) -> int:
         print(f"diagnose: what has ended is in {folder / 'tasks'}; the same command goes on", file=sys.stderr)
         raise
     save_diagnosis(diagnosis, folder)
-    text = (folder / "result.json").read_text(encoding="utf-8")
-    if options.json:
-        print(text)
-    else:
-        print(diagnosis_summary(json.loads(text)))
-        print(f"Report: {folder / 'report.html'}")
+    show(options, folder, diagnosis_summary)
     return DONE
 
 
@@ -55,12 +49,7 @@ def _design(options: argparse.Namespace) -> int:
     folder, between = output_folder(options), [_pair(text) for text in options.between]
     design = designed(checked(options), options.criterion, between, _Lines())
     save_design(design, between, folder)
-    text = (folder / "result.json").read_text(encoding="utf-8")
-    if options.json:
-        print(text)
-    else:
-        print(design_summary(json.loads(text)))
-        print(f"Report: {folder / 'report.html'}")
+    show(options, folder, design_summary)
     return DONE
 
 

@@ -18,17 +18,19 @@ def add_commands(commands: Any) -> None:
 
 def _simulate(options: argparse.Namespace) -> int:
     from friction_ocp.estimation.estimate import simulate
+    from friction_ocp.report.text import summary
     from friction_ocp.result_folder import save
 
     folder = output_folder(options)
     save(simulate(checked(options)), folder)
-    show(options, folder)
+    show(options, folder, summary)
     return DONE
 
 
 def _identify(options: argparse.Namespace) -> int:
     from friction_ocp.estimation.estimate import Interrupted, identify
     from friction_ocp.progress_bar import progress_bar
+    from friction_ocp.report.text import summary
     from friction_ocp.result_folder import save
 
     folder, problem, patience = output_folder(options), checked(options), Patience()
@@ -38,7 +40,7 @@ def _identify(options: argparse.Namespace) -> int:
     except Interrupted as stopped:
         estimate = stopped.estimate
     save(estimate, folder)
-    show(options, folder)
+    show(options, folder, summary)
     if patience.asked:
         return INTERRUPTED
     if not estimate.converged:

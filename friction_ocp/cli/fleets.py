@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.cli.options import DONE, NOT_CONVERGED, add_workers, executor, output_folder
+from friction_ocp.cli.options import DONE, NOT_CONVERGED, add_workers, executor, output_folder, show
 
 
 def add_commands(commands: Any) -> None:
@@ -53,10 +52,5 @@ def _batch(options: argparse.Namespace) -> int:
         print(f"batch: fits that have ended are in {folder}; the same command goes on", file=sys.stderr)
         raise
     save_fleet(fleet, folder)
-    text = (folder / "result.json").read_text(encoding="utf-8")
-    if options.json:
-        print(text)
-    else:
-        print(fleet_summary(json.loads(text)))
-        print(f"Report: {folder / 'report.html'}")
+    show(options, folder, fleet_summary)
     return NOT_CONVERGED if any(fit.status == "not_converged" for fit in fleet.fits) else DONE

@@ -84,13 +84,11 @@ def checked(options: argparse.Namespace) -> Problem:
     return problem
 
 
-def show(options: argparse.Namespace, folder: Path) -> None:
-    """Print the result in an output folder: as it is, or in a few lines."""
+def show(options: argparse.Namespace, folder: Path, summary: Callable[[Any], str]) -> None:
+    """Print the result in an output folder: as it is, or in the few lines that `summary` makes of it."""
     text = (folder / "result.json").read_text(encoding="utf-8")
     if options.json:
         print(text)
         return
-    from friction_ocp.report.text import summary
-
     print(summary(json.loads(text)))
     print(f"Report: {folder / 'report.html'}")

@@ -113,6 +113,7 @@ def _pairs(texts: Sequence[str]) -> list[tuple[str, str]]:
 
 def _work(options: argparse.Namespace, make: Make) -> int:
     """Make a statistic, save and show it; an interrupt leaves what was finished in the output folder."""
+    from friction_ocp.report.text import summary
     from friction_ocp.result_folder import save
 
     folder = output_folder(options)
@@ -126,7 +127,7 @@ def _work(options: argparse.Namespace, make: Make) -> int:
             )
         raise
     save(statistic, folder)
-    show(options, folder)
+    show(options, folder, summary)
     return _status(options, statistic)
 
 

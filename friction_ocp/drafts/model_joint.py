@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from friction_ocp.drafts.axis import Axis, positive
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.optional_library import optional_library
 
 MAX_BYTES = 20_000_000
 TURNS = 24
@@ -22,7 +22,7 @@ HINGE, SLIDE = 3, 2
 
 def axis_of_joint(path: Path, joint: str | None) -> Axis:
     """Return the axis of a joint at the model's start pose; raises FrictionOcpError with the joints that there are."""
-    mujoco = _library(path)
+    mujoco = optional_library("mujoco", "mujoco", "mujoco", str(path), "reading a model")
     model = _load(mujoco, path)
     index = _find(model, joint, path)
     dof, address = int(model.jnt_dofadr[index]), int(model.jnt_qposadr[index])
@@ -49,14 +49,6 @@ def axis_of_joint(path: Path, joint: str | None) -> Axis:
             notes=tuple(notes),
         )
     )
-
-
-def _library(path: Path) -> Any:
-    try:
-        return importlib.import_module("mujoco")
-    except ImportError as error:
-        what = "reading a model needs the package mujoco, which is not installed"
-        raise FrictionOcpError(Finding(str(path), what, remedy="pip install 'friction-ocp[mujoco]'")) from error
 
 
 def _load(mujoco: Any, path: Path) -> Any:

@@ -120,8 +120,8 @@ def _with_start(model: Model, cut: Segments) -> Segments:
 def mean_error(program: Program, point: Point) -> float:
     """Return the mean absolute error of all samples over their noise floors."""
     sizes: list[FloatArray] = []
-    for index, item in enumerate(program.experiments):
-        errors = program.residuals(index, program.simulate(index, point).y)
+    for index, (item, result) in enumerate(zip(program.experiments, program.simulate_all(point), strict=True)):
+        errors = program.residuals(index, result.y)
         sizes.append(np.abs(errors[np.isfinite(item.measured)]))
     return float(np.mean(np.concatenate(sizes)))
 

@@ -241,8 +241,7 @@ class CompiledModel:
             h = float(grid.dt[k]) / steps if grid.dt[k] > 0 else float(grid.dt[k - 1]) / int(grid.substeps[k - 1])
             self._function("output")(_address(x), _address(u), _address(p), ctypes.c_double(h), _address(y[k]))
             for sub in range(steps if grid.dt[k] > 0 else 0):
-                middle = grid.at_start[k] + (sub + 0.5) / steps * (grid.at_end[k] - grid.at_start[k])
-                v = np.ascontiguousarray(middle)
+                v = np.ascontiguousarray(grid.between(k, (sub + 0.5) / steps))
                 self._function("step")(_address(x), _address(v), _address(p), ctypes.c_double(h))
         return y
 

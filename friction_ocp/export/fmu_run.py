@@ -13,6 +13,7 @@ import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.export.fitted import Fitted, Run
+from friction_ocp.optional_library import optional_library
 from friction_ocp.simulation.grid import FloatArray
 
 ACTED = 6000
@@ -20,11 +21,7 @@ ACTED = 6000
 
 def fmpy_library(path: Path) -> Any:
     """Import FMPy; raises FrictionOcpError with the install command where it is missing."""
-    try:
-        return importlib.import_module("fmpy")
-    except ImportError as error:
-        what = "checking and running an FMU needs the package FMPy, which is not installed"
-        raise FrictionOcpError(Finding(str(path), what, remedy="pip install 'friction-ocp[fmu]'")) from error
+    return optional_library("fmpy", "FMPy", "fmu", str(path), "checking and running an FMU")
 
 
 @contextmanager

@@ -6,7 +6,6 @@ neither mechanics nor friction (windings, integrals, lags, sampled controllers) 
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,9 @@ import numpy as np
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_command, motor_torque
 from friction_ocp.drive.stepping import recorded, state_symbols
-from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.export.fitted import Fitted, Run, flat
 from friction_ocp.export.joints import JointDrive
+from friction_ocp.optional_library import optional_library
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
 
 STRAY = 1e6
@@ -27,11 +26,7 @@ STRAY = 1e6
 
 def mujoco_library(where: str) -> Any:
     """Import MuJoCo; raises FrictionOcpError with the install command where it is missing."""
-    try:
-        return importlib.import_module("mujoco")
-    except ImportError as error:
-        what = "measuring what the export costs needs the package mujoco, which is not installed"
-        raise FrictionOcpError(Finding(where, what, remedy="pip install 'friction-ocp[mujoco]'")) from error
+    return optional_library("mujoco", "mujoco", "mujoco", where, "measuring what the export costs")
 
 
 @dataclass(frozen=True)
@@ -97,7 +92,7 @@ class MuJoCoRun:
         self._model.opt.timestep = h
         step = self._fitted.model.drive.step
         for sub in range(steps):
-            u = grid.at_start[k] + (sub + 0.5) / steps * (grid.at_end[k] - grid.at_start[k])
+            u = grid.between(k, (sub + 0.5) / steps)
             self._push(data, x, u, run.numbers)
             self._mujoco.mj_step(self._model, data)
             if self._own:

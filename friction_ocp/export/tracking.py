@@ -108,7 +108,7 @@ def _closed_loop(fitted: Fitted, run: Run, share: float) -> FloatArray:
         h = float(grid.dt[k] or grid.dt[k - 1]) / steps
         y[k] = flat(drive.output(x, grid.at_node[k], p, h, width))
         for sub in range(steps if grid.dt[k] > 0 else 0):
-            u = grid.at_start[k] + (sub + 0.5) / steps * (grid.at_end[k] - grid.at_start[k])
+            u = grid.between(k, (sub + 0.5) / steps)
             x = flat(drive.step(x, u, p, h, width))
     return y
 

@@ -149,11 +149,10 @@ class FrictionElement:
         it, sigma0 |omega| / g = sqrt(sigma0 / inertia), or slip takes half of the damping's share away.
         """
         (_, positive), (_, negative) = self._bristles()
-        speed, stiffness, damping = smooth_abs(omega), self._sigma(0, torque), self._sigma(1, torque)
+        stiffness, damping = self._sigma(0, torque), self._sigma(1, torque)
         reach = where(torque >= 0, positive.level(0.0), negative.level(0.0)) / stiffness
-        level = where(omega >= 0, positive.level(speed), negative.level(speed))
-        slip = damping * speed / level
-        pace = speed * (stiffness * inertia) ** 0.5 / level
+        rate = self.forgetting_rate(omega, torque, 0.0)
+        slip, pace = damping * rate / stiffness, rate * (inertia / stiffness) ** 0.5
         kept = where(slip <= 0.5, 1.0 - 2.0 * slip, 0.0) * where(pace <= 1.0, 1.0 - pace, 0.0)
         share = where(slip <= 0.5, 1.0 - slip, 0.5)
         balance = (torque - (damping + self._sigma(2, omega)) * omega) / (stiffness * share)

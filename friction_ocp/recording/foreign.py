@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import importlib
 import os
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.optional_library import optional_library
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
@@ -66,11 +66,7 @@ def no_clock(name: str) -> FloatArray:
 
 def library(module: str, package: str, extra: str, path: Path) -> Any:
     """Import the library that reads a format; raises FrictionOcpError with the install command where it is missing."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        what = f"reading {path.suffix or 'this folder'} needs the package {package}, which is not installed"
-        raise FrictionOcpError(Finding(str(path), what, remedy=f"pip install 'friction-ocp[{extra}]'")) from error
+    return optional_library(module, package, extra, str(path), f"reading {path.suffix or 'this folder'}")
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from friction_ocp.plots.numbers import percent, significant
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.design_words import design_sentence, limits_sentence
 from friction_ocp.report.page import paragraphs, render_page
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 
 def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
@@ -29,8 +29,7 @@ def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -
             "figures": pictures,
         },
     )
-    with whole_file(path) as staged:
-        staged.write_text(page, encoding="utf-8", newline="\n")
+    write_text(path, page)
 
 
 def _option(item: Json) -> dict[str, str]:

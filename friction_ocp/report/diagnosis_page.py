@@ -11,7 +11,7 @@ from friction_ocp.plots.numbers import plain, significant, unit_text
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.diagnosis_words import alias_sentences, bias_sentences, diagnosis_sentence, round_sentence
 from friction_ocp.report.page import paragraphs, render_page
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 LISTED = 10
 """Candidates in the table of a round."""
@@ -19,9 +19,7 @@ LISTED = 10
 
 def write_diagnosis_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
     """Write report.html in one step; `figures` are PNG files by name."""
-    page = render_diagnosis(result, figures)
-    with whole_file(path) as staged:
-        staged.write_text(page, encoding="utf-8", newline="\n")
+    write_text(path, render_diagnosis(result, figures))
 
 
 def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
@@ -38,7 +36,8 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
     return render_page(
         "diagnosis.html",
         {
-            **{key: str(result.get(key) or "") for key in ("title", "problem", "verdict")},
+            **{key: str(result.get(key) or "") for key in ("title", "problem")},
+            "verdict_word": str(result.get("verdict") or ""),
             "question": paragraphs(str(result.get("question") or "")),
             "sentence": diagnosis_sentence(result),
             "evaluated_on": rows(gap, "evaluated_on"),

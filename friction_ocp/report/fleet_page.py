@@ -21,14 +21,12 @@ from friction_ocp.report.fleet_words import (
 from friction_ocp.report.page import facts, paragraphs, render_page
 from friction_ocp.report.section import interval_text
 from friction_ocp.report.tables import Cell
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 
 def write_fleet_report(result: Json, path: Path) -> None:
     """Write report.html in one step."""
-    page = render_fleet(result)
-    with whole_file(path) as staged:
-        staged.write_text(page, encoding="utf-8", newline="\n")
+    write_text(path, render_fleet(result))
 
 
 def render_fleet(result: Json) -> str:

@@ -24,7 +24,7 @@ from friction_ocp.report.tables import (
     parameter_rows,
     static_rows,
 )
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 _HERE = Path(__file__).parent
 
@@ -42,9 +42,7 @@ class EmbeddedRecording:
 
 def write_report(result: Json, series: Series, path: Path) -> None:
     """Write report.html in one step: a reader sees the old file or the whole new one."""
-    page = render_report(result, series)
-    with whole_file(path) as staged:
-        staged.write_text(page, encoding="utf-8", newline="\n")
+    write_text(path, render_report(result, series))
 
 
 def render_report(result: Json, series: Series) -> str:
@@ -60,7 +58,7 @@ def render_report(result: Json, series: Series) -> str:
             **{key: str(result.get(key) or "") for key in ("title", "problem", "message")},
             "question": paragraphs(str(result.get("question") or "")),
             "converged": result.get("status") == "converged",
-            "verdict": whole_verdict(result),
+            "sentence": whole_verdict(result),
             "statistic": drawn_section(result),
             "warnings": rows(result, "warnings"),
             "parameters": parameter_rows(objects(result, "parameters")),

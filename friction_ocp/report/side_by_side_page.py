@@ -11,7 +11,7 @@ from friction_ocp.plots.side_by_side import side_by_side_figure
 from friction_ocp.plots.style import figure_style, svg_text
 from friction_ocp.report.page import render_page
 from friction_ocp.report.section import StatisticSection, StatisticTable, columns, table_lines
-from friction_ocp.whole_file import whole_file
+from friction_ocp.whole_file import write_text
 
 NOTABLE = 3.0
 """Standard deviations from which a difference is counted."""
@@ -19,8 +19,7 @@ NOTABLE = 3.0
 
 def write_side_by_side(document: Json, path: Path) -> None:
     """Write report.html in one step."""
-    with whole_file(path) as staged:
-        staged.write_text(render_side_by_side(document), encoding="utf-8", newline="\n")
+    write_text(path, render_side_by_side(document))
 
 
 def render_side_by_side(document: Json) -> str:

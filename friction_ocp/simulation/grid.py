@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -45,10 +46,14 @@ class Grid:
     at_node: FloatArray
     """(n, inputs) inputs that hold at each node."""
 
-    @property
+    @cached_property
     def dt(self) -> FloatArray:
         """(n,) interval lengths; the last is 0."""
         return np.append(np.diff(self.time), 0.0)
+
+    def between(self, k: int, share: float) -> FloatArray:
+        """Return (inputs,) the inputs at a share of interval k."""
+        return self.at_start[k] + share * (self.at_end[k] - self.at_start[k])
 
     def with_step(self, max_step: float) -> Grid:
         """Return the same nodes with integrator steps of at most `max_step` s."""
