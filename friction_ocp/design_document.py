@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from friction_ocp.design.design import Design, Option
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import drive_leaves
+from friction_ocp.excitation.design import Design, Option
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-design/1"
 RECORDING = "excitation.h5"
 
 
-def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str, Any]:
-    """Return the content of result.json for a design; `between` are the rivals it separates, if any."""
+def design_document(design: Design) -> dict[str, Any]:
+    """Return the content of result.json for a design."""
     names = design.fitted.model.space.names
     drive = design.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
@@ -23,7 +23,7 @@ def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str,
         "status": "designed" if design.options else "nothing_possible",
         **heading(design.problem),
         "criterion": design.criterion,
-        "separates": [{"effect": effect, "component": place} for effect, place in between],
+        "separates": [{"effect": effect, "component": place} for effect, place in design.between],
         "limits": {key: getattr(design.limits, key) for key in ("speed", "torque", "travel")},
         "limits_stated": list(design.limits.stated),
         "recording": RECORDING if design.options else None,
@@ -39,7 +39,7 @@ def design_document(design: Design, between: list[tuple[str, str]]) -> dict[str,
         "provenance": provenance(
             design.problem,
             "design",
-            {"criterion": design.criterion, "between": [list(pair) for pair in between]},
+            {"criterion": design.criterion, "between": [list(pair) for pair in design.between]},
         ),
     }
 

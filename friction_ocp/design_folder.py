@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from friction_ocp.design.design import Design
 from friction_ocp.design_document import RECORDING, design_document
 from friction_ocp.drive.units import signal_unit
+from friction_ocp.excitation.design import Design
 from friction_ocp.recording.result_series import ChannelSeries, RecordingSeries
 from friction_ocp.result_folder import plain_arrays
 from friction_ocp.whole_file import write_text
 
 
-def save_design(design: Design, between: list[tuple[str, str]], folder: str | Path) -> Path:
+def save_design(design: Design, folder: str | Path) -> Path:
     """Write everything that `design` leaves behind and return the folder."""
     from friction_ocp.plots.design import design_figures
     from friction_ocp.plots.style import figure_style, save
@@ -24,7 +24,7 @@ def save_design(design: Design, between: list[tuple[str, str]], folder: str | Pa
 
     target = Path(folder)
     (target / "figures").mkdir(parents=True, exist_ok=True)
-    document, series = design_document(design, between), _series(design)
+    document, series = design_document(design), _series(design)
     write_text(target / "result.json", json.dumps(document, indent=1, allow_nan=False))
     write_result_series(target / "result.h5", series)
     if design.options:

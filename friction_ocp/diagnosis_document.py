@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.design.next_experiment import FollowUp
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
@@ -21,6 +20,7 @@ from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
+from friction_ocp.excitation.next_experiment import FollowUp
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"

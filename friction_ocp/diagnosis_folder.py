@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from friction_ocp.design.next_experiment import follow_up
 from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.drive.units import signal_unit
+from friction_ocp.excitation.next_experiment import follow_up
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import run_series
 from friction_ocp.result_folder import plain_arrays

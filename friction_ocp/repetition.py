@@ -10,18 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard, cast
 
-from friction_ocp.design.design import designed
-from friction_ocp.design_folder import save_design
 from friction_ocp.diagnosis.diagnose import diagnose
-from friction_ocp.diagnosis_folder import save_diagnosis
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.excitation.design import design
+from friction_ocp.execution.executor import InProcess
 from friction_ocp.fleet.batch import STORE, batch
-from friction_ocp.fleet_folder import save_fleet
+from friction_ocp.output_folder import save
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.result_document import provenance
-from friction_ocp.result_folder import save
 from friction_ocp.statistics.bootstrap import bootstrap
 from friction_ocp.statistics.compare import compare
 from friction_ocp.statistics.execution import Execution
@@ -83,15 +81,20 @@ class Repetition:
         return not self.differences
 
 
-def repeat(
-    result: Path, folder: Path, execution: Execution, tolerance: float = TOLERANCE, problem: Path | None = None
+def rerun(
+    result: str | Path,
+    folder: str | Path,
+    execution: Execution = Execution(InProcess()),
+    tolerance: float = TOLERANCE,
+    problem: Path | None = None,
 ) -> Repetition:
-    """Make the result in a file or folder again, into another folder, and compare the two.
+    """Make the result in a file or folder again, into another folder, and compare the two; rerun.json tells it.
 
     The problem is what the result holds; recordings are found from where the problem file lay, or from `problem` where
     it has moved. Raises FrictionOcpError where the result does not say how it was made, or a recording is gone.
     """
-    path = result / "result.json" if result.is_dir() else result
+    source, folder = Path(result), Path(folder)
+    path = source / "result.json" if source.is_dir() else source
     before = read_result(path)
     made = _provenance(before, path)
     if (folder / "result.json").exists() and (folder / "result.json").samefile(path):
@@ -104,11 +107,14 @@ def repeat(
     _forget(folder)
     pairs = list(_pairs("", *({key: one[key] for key in COMPARED if key in one} for one in (before, after))))
     differences = tuple(_differences(pairs, tolerance))
-    return Repetition(tuple(_changed(made, after["provenance"], places, problems)), len(pairs), differences)
+    changed = tuple(_changed(made, after["provenance"], places, problems))
+    found = Repetition(changed, len(pairs), differences)
+    _write(found, folder)
+    return found
 
 
-def save_repetition(found: Repetition, folder: Path) -> Path:
-    """Write rerun.json beside the result that was made again and return the folder."""
+def _write(found: Repetition, folder: Path) -> None:
+    """Write rerun.json beside the result that was made again."""
     content = {
         "format": FORMAT,
         "agrees": found.agrees,
@@ -117,7 +123,6 @@ def save_repetition(found: Repetition, folder: Path) -> Path:
         "differences": [{"where": d.where, "before": d.before, "after": d.after} for d in found.differences],
     }
     write_text(folder / "rerun.json", json.dumps(content, indent=1))
-    return folder
 
 
 def read_result(path: Path) -> dict[str, Any]:
@@ -178,13 +183,13 @@ def _simulate(problems: Sequence[Problem], made: Json, folder: Path, execution: 
 
 
 def _diagnose(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
-    save_diagnosis(diagnose(problems[0], execution=execution), folder)
+    save(diagnose(problems[0], execution=execution), folder)
 
 
 def _design(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
     options = made["command"]["options"]
     between = [(str(effect), str(place)) for effect, place in options["between"]]
-    save_design(designed(problems[0], options["criterion"], between), between, folder)
+    save(design(problems[0], options["criterion"], between), folder)
 
 
 def _multistart(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
@@ -208,7 +213,7 @@ def _batch(problems: Sequence[Problem], made: Json, folder: Path, execution: Exe
     options = made["command"]["options"]
     files = [Path(name) for name in made["recordings"]]
     fleet = batch(problems[0], files, folder, **options, executor=execution.executor, watch=execution.watch)
-    save_fleet(fleet, folder)
+    save(fleet, folder)
 
 
 _COMMANDS: Mapping[str, Callable[[Sequence[Problem], Json, Path, Execution], None]] = {

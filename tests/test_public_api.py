@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import friction_ocp
+from friction_ocp.cli import _parser
 
 IMPORT_SECONDS = 0.5
 SPARED = ("casadi", "matplotlib", "h5py", "numpy", "scipy", "pydantic", "yaml", "pint", "plotly", "rich")
@@ -42,6 +45,7 @@ def test_importing_the_package_is_quick() -> None:
 import sys, time
 began = time.perf_counter()
 import friction_ocp
+from friction_ocp.cli import _parser
 print(time.perf_counter() - began, *[name for name in {SPARED!r} if name in sys.modules])
 """
     runs = [
@@ -50,3 +54,15 @@ print(time.perf_counter() - began, *[name for name in {SPARED!r} if name in sys.
     ]
     assert min(float(run[0]) for run in runs) < IMPORT_SECONDS
     assert runs[0][1:] == []
+
+
+KEYWORD = {"import": "import_recording"}
+"""A command whose name Python does not allow for a function."""
+
+
+def test_every_command_has_its_function() -> None:
+    """What the command line does is called by the same name in Python."""
+    (commands,) = (action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction))
+    functions = {KEYWORD.get(name, name) for name in commands.choices}
+    assert functions <= set(friction_ocp.__all__)
+    assert all(inspect.isfunction(getattr(friction_ocp, name)) for name in functions)

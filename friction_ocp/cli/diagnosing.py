@@ -42,13 +42,12 @@ def _diagnose(options: argparse.Namespace) -> int:
 
 
 def _design(options: argparse.Namespace) -> int:
-    from friction_ocp.design.design import designed
     from friction_ocp.design_folder import save_design
+    from friction_ocp.excitation.design import design
     from friction_ocp.report.design_words import design_summary
 
     folder, between = output_folder(options), [_pair(text) for text in options.between]
-    design = designed(checked(options), options.criterion, between, _Lines())
-    save_design(design, between, folder)
+    save_design(design(checked(options), options.criterion, between, _Lines()), folder)
     show(options, folder, design_summary)
     return DONE
 

@@ -10,8 +10,6 @@ from typing import Any
 from friction_ocp.cli.options import DONE
 from friction_ocp.errors import Finding, FrictionOcpError
 
-MODELS = (".xml", ".mjcf", ".urdf")
-
 
 def add_commands(commands: Any) -> None:
     """Add `init` to the parser."""
@@ -24,12 +22,12 @@ def add_commands(commands: Any) -> None:
 
 
 def _init(options: argparse.Namespace) -> int:
-    from friction_ocp.drafts.draft import write_draft
-    from friction_ocp.drafts.recorded import recordings_of
+    from friction_ocp.drafts.draft import init
+    from friction_ocp.drafts.questions import axis_of_answers
 
-    axis = _axis(options)
-    recorded = recordings_of(options.recordings, axis)
-    write_draft(axis, recorded, options.out)
+    _refuse_silence(options.source)
+    source = axis_of_answers(input) if options.source is None else options.source
+    recorded = init(source, options.recordings, options.out, options.joint)
     print(
         f"Written: {options.out}, with {len(recorded.train)} recordings to fit and {len(recorded.validation)} to judge"
     )
@@ -41,19 +39,9 @@ def _init(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _axis(options: argparse.Namespace) -> Any:
-    """Return the axis of a model, a template, or of answers on the terminal."""
-    from friction_ocp.drafts.axis import TEMPLATES, template
-    from friction_ocp.drafts.model_joint import axis_of_joint
-    from friction_ocp.drafts.questions import axis_of_answers
+def _refuse_silence(source: str | None) -> None:
+    from friction_ocp.drafts.axis import TEMPLATES
 
-    if options.source is None:
-        if not sys.stdin.isatty():
-            allowed = f"a template ({', '.join(TEMPLATES)}), or a model in MJCF or URDF"
-            raise FrictionOcpError(Finding("init", "nothing is named, and there is no terminal to ask on", allowed))
-        return axis_of_answers(input)
-    if Path(options.source).suffix.lower() in MODELS:
-        return axis_of_joint(Path(options.source), options.joint)
-    if options.joint is not None:
-        raise FrictionOcpError(Finding("init", "--joint stands beside a template", "a model in MJCF or URDF"))
-    return template(options.source)
+    if source is None and not sys.stdin.isatty():
+        allowed = f"a template ({', '.join(TEMPLATES)}), or a model in MJCF or URDF"
+        raise FrictionOcpError(Finding("init", "nothing is named, and there is no terminal to ask on", allowed))

@@ -25,10 +25,10 @@ def add_commands(commands: Any) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from friction_ocp.export.fitted import load_fitted
-    from friction_ocp.export.price import judged_by, price_text
-    from friction_ocp.export.targets import export
-    from friction_ocp.export.tracking import tracking_gain, tracking_text
+    from friction_ocp.targets.export import export
+    from friction_ocp.targets.fitted import load_fitted
+    from friction_ocp.targets.price import judged_by, price_text
+    from friction_ocp.targets.tracking import tracking_gain, tracking_text
 
     fitted = load_fitted(options.result)
     exported = export(fitted, options.to, options.out)

@@ -27,7 +27,7 @@ def add_commands(commands: Any) -> None:
 
 def _rerun(options: argparse.Namespace) -> int:
     from friction_ocp.progress_bar import progress_bar, task_bar
-    from friction_ocp.repetition import repeat, save_repetition
+    from friction_ocp.repetition import rerun
     from friction_ocp.statistics.execution import Execution
 
     result: Path = options.result
@@ -35,8 +35,7 @@ def _rerun(options: argparse.Namespace) -> int:
     folder = output_folder(argparse.Namespace(out=options.out, problem=Path(named), command="rerun"))
     with progress_bar() as progress, task_bar() as watch:
         execution = Execution(executor(options), folder, progress, watch)
-        found = repeat(result, folder, execution, options.tolerance, options.problem)
-    save_repetition(found, folder)
+        found = rerun(result, folder, execution, options.tolerance, options.problem)
     if options.json:
         print((folder / "rerun.json").read_text(encoding="utf-8"))
         return DONE if found.agrees else WRONG_INPUT

@@ -6,14 +6,39 @@ import os
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.drafts.axis import Axis, constraints, drive_section
-from friction_ocp.drafts.recorded import Recorded
+from friction_ocp.drafts.axis import Axis, constraints, drive_section, template
+from friction_ocp.drafts.model_joint import axis_of_joint
+from friction_ocp.drafts.recorded import Recorded, recordings_of
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.problem_file.check import check_file
 from friction_ocp.problem_file.document import dump_document
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.problem_file.schema import FORMAT
 from friction_ocp.whole_file import whole_file
+
+MODELS = (".xml", ".mjcf", ".urdf")
+
+
+def init(
+    source: str | Path | Axis, recordings: str | Path = ".", path: str | Path = "problem.yaml", joint: str | None = None
+) -> Recorded:
+    """Write the first draft of a problem file, and return what the recordings of the folder measure.
+
+    `source` is a template, a model in MJCF or URDF with a joint, or an axis. Raises FrictionOcpError where it is none,
+    the folder has no recordings, or there is a file already.
+    """
+    axis = source if isinstance(source, Axis) else _axis(str(source), joint)
+    recorded = recordings_of(Path(recordings), axis)
+    write_draft(axis, recorded, Path(path))
+    return recorded
+
+
+def _axis(source: str, joint: str | None) -> Axis:
+    if Path(source).suffix.lower() in MODELS:
+        return axis_of_joint(Path(source), joint)
+    if joint is not None:
+        raise FrictionOcpError(Finding("init", "--joint stands beside a template", "a model in MJCF or URDF"))
+    return template(source)
 
 
 def write_draft(axis: Axis, recorded: Recorded, path: Path) -> None:

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from friction_ocp.estimation.estimate import identify
-from friction_ocp.export.fitted import load_fitted
-from friction_ocp.export.joints import joint_drive
-from friction_ocp.export.mjcf import mjcf_text
-from friction_ocp.export.mujoco_run import MuJoCoRun
-from friction_ocp.export.price import price_table, price_text
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.result_folder import fitted_problem
+from friction_ocp.targets.fitted import load_fitted
+from friction_ocp.targets.joints import joint_drive
+from friction_ocp.targets.mjcf import mjcf_text
+from friction_ocp.targets.mujoco_run import MuJoCoRun
+from friction_ocp.targets.price import price_table, price_text
 
 PROBLEM = Path(__file__).parents[1] / "xl330" / "coulomb_viscous.yaml"
 MOST_ADDED = 0.02

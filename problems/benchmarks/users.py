@@ -43,7 +43,7 @@ def fuzzing(line: str, quick: bool) -> Check:
 def formats(line: str, quick: bool) -> Check:
     """Run the tests of all formats, and the servo's fit in MuJoCo."""
     priced = script_check(line, "formats.py", *(("--quick",) if quick else ()))
-    tested = tests_check(line, "tests/recording/test_foreign.py", "tests/recording/test_csv.py", "tests/export")
+    tested = tests_check(line, "tests/recording/test_foreign.py", "tests/recording/test_csv.py", "tests/targets")
     return Check(line, f"{priced.measured}\n{tested.measured}", bool(priced.passed and tested.passed))
 
 

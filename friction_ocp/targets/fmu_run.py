@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.export.fitted import Fitted, Run
 from friction_ocp.optional_library import optional_library
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.targets.fitted import Fitted, Run
 
 ACTED = 6000
 

@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.estimation.curves import friction_curves
-from friction_ocp.export.fitted import Fitted, result_document
 from friction_ocp.quantities import si_unit
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.targets.fitted import Fitted, result_document
 
 COLUMNS = ("shaft", "load", "load_unit", "speed", "speed_unit", "torque", "lower95", "upper95", "torque_unit")
 

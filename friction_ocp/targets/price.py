@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from friction_ocp.export.fitted import Fitted, Run, rms
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.targets.fitted import Fitted, Run, rms
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from friction_ocp.drive.steady import reference_shaft, steady_speeds
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.export.fitted import Fitted, Run
 from friction_ocp.friction.smoothing import smooth_sign, where
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.quantities import si_unit
 from friction_ocp.simulation.compiled import compiler, load_library
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
+from friction_ocp.targets.fitted import Fitted, Run
 
 FLAGS = ("-std=c99", "-Wall", "-Werror", "-pedantic", "-Wno-unused", "-O2", "-fPIC", "-shared")
 WIDTH_SHARE = 0.01

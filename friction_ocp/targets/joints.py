@@ -16,9 +16,9 @@ from friction_ocp.drive.mechanism import mechanism
 from friction_ocp.drive.parts import Drive, Motion, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.export.fitted import Fitted, both_ways
 from friction_ocp.friction.static import Coulomb, CoulombViscous, NoFriction, Viscous
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.targets.fitted import Fitted, both_ways
 
 optimize: Any = _optimize  # its own types are incomplete
 

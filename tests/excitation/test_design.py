@@ -13,8 +13,6 @@ from diagnosis_cases import axis, write_case
 from plant import Trajectory
 
 from friction_ocp.cli import main
-from friction_ocp.design.design import Design, designed
-from friction_ocp.design.worth import evidence
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.errors import FrictionOcpError
@@ -22,6 +20,8 @@ from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.excitation.design import Design, design
+from friction_ocp.excitation.worth import evidence
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import read_recording
 from friction_ocp.recording.recording import Channel, Recording
@@ -45,23 +45,23 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def design(path: Path) -> Design:
+def sharper(path: Path) -> Design:
     """Return the design that sharpens the parameters of the axis."""
-    return designed(load_problem(path), "D", [], silent)
+    return design(load_problem(path), "D", [], silent)
 
 
-def test_motions_keep_the_limits(design: Design) -> None:
+def test_motions_keep_the_limits(sharper: Design) -> None:
     """No motion exceeds the stated speed, nor the torque and travel that the recordings reached, by more than 5 %."""
-    assert design.limits.stated == ("speed",)
-    assert len(design.options) >= 6
-    for option in design.options:
-        for key, limit in (("speed", SPEED), ("torque", design.limits.torque), ("travel", design.limits.travel)):
+    assert sharper.limits.stated == ("speed",)
+    assert len(sharper.options) >= 6
+    for option in sharper.options:
+        for key, limit in (("speed", SPEED), ("torque", sharper.limits.torque), ("travel", sharper.limits.travel)):
             assert option.run.peaks[key] <= 1.05 * limit
 
 
-def test_the_plant_confirms_the_expected_standard_errors(design: Design) -> None:
+def test_the_plant_confirms_the_expected_standard_errors(sharper: Design) -> None:
     """The information in the best motion, made by the plant, is what the design expects, within a fifth."""
-    option, fitted = design.options[0], design.fitted
+    option, fitted = sharper.options[0], sharper.fitted
     current = option.run.recording.channels["current"]
     inputs = {"motor.current": Trajectory(current.time, current.values, "zero")}
     run = axis().simulate(float(current.time[-1]), inputs, np.random.default_rng(3))
@@ -79,16 +79,16 @@ def test_the_plant_confirms_the_expected_standard_errors(design: Design) -> None
 UNITS = {"position": "rad", "current": "A"}
 
 
-def test_a_model_has_no_evidence_against_itself(design: Design) -> None:
+def test_a_model_has_no_evidence_against_itself(sharper: Design) -> None:
     """What a model made separates it from itself by less than a hundredth of a noise floor squared."""
-    for option in design.options[:3]:
-        assert evidence(design.fitted, option.run.recording).separation < 0.01
+    for option in sharper.options[:3]:
+        assert evidence(sharper.fitted, option.run.recording).separation < 0.01
 
 
 def test_rivals_are_separated_by_the_best_motion(path: Path) -> None:
     """Stribeck friction and quadratic drag, refitted, are told apart better by the first motion than by the last."""
     problem = load_problem(write_case(path.parent, axis(law="stribeck", tau_s=0.15, omega_s=6.0)))
-    found = designed(problem, "D", [("stribeck", "motor"), ("quadratic_drag", "motor")], silent)
+    found = design(problem, "D", [("stribeck", "motor"), ("quadratic_drag", "motor")], silent)
     assert found.options[0].power is not None
     assert found.options[0].power > 0.99
     assert found.options[0].worth > 2.0 * found.options[-1].worth
@@ -106,4 +106,4 @@ def test_the_command_leaves_a_recording_that_can_be_played(path: Path, tmp_path:
 def test_candidates_that_there_are_not_are_named(path: Path) -> None:
     """A wrong candidate is refused with those that there are."""
     with pytest.raises(FrictionOcpError, match="stribeck@motor"):
-        designed(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)
+        design(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)

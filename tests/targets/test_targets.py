@@ -17,17 +17,17 @@ from servo_problem import REPOSITORY
 
 from friction_ocp.cli import DONE, WRONG_INPUT, main
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.export.c_source import CompiledModel, c_source, compensation_width
-from friction_ocp.export.fitted import Fitted, load_fitted
-from friction_ocp.export.fmu import write_fmu
-from friction_ocp.export.fmu_run import loaded_fmu
-from friction_ocp.export.joints import joint_drive
-from friction_ocp.export.mjcf import mjcf_text
-from friction_ocp.export.mujoco_run import MuJoCoRun
-from friction_ocp.export.price import price_table, price_text
-from friction_ocp.export.table import table_text
-from friction_ocp.export.tracking import tracking_gain
-from friction_ocp.export.urdf import urdf_text
+from friction_ocp.targets.c_source import CompiledModel, c_source, compensation_width
+from friction_ocp.targets.fitted import Fitted, load_fitted
+from friction_ocp.targets.fmu import write_fmu
+from friction_ocp.targets.fmu_run import loaded_fmu
+from friction_ocp.targets.joints import joint_drive
+from friction_ocp.targets.mjcf import mjcf_text
+from friction_ocp.targets.mujoco_run import MuJoCoRun
+from friction_ocp.targets.price import price_table, price_text
+from friction_ocp.targets.table import table_text
+from friction_ocp.targets.tracking import tracking_gain
+from friction_ocp.targets.urdf import urdf_text
 
 SAME_CODE = 1e-9
 """The same arithmetic, compiled by another call."""

@@ -15,10 +15,10 @@ import numpy as np
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_command, motor_torque
 from friction_ocp.drive.stepping import recorded, state_symbols
-from friction_ocp.export.fitted import Fitted, Run, flat
-from friction_ocp.export.joints import JointDrive
 from friction_ocp.optional_library import optional_library
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
+from friction_ocp.targets.fitted import Fitted, Run, flat
+from friction_ocp.targets.joints import JointDrive
 
 STRAY = 1e6
 """Angle, rad or m, beyond which a run has failed."""

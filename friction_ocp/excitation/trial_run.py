@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.design.limits import Limits
-from friction_ocp.design.motions import Motion
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.drive.parts import Channel, Controller, Drive
 from friction_ocp.drive.units import signal_unit
@@ -18,6 +16,8 @@ from friction_ocp.estimation.model import prepare, slowest_period
 from friction_ocp.estimation.problem import EstimationOptions, RecordingUse
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import free_run
+from friction_ocp.excitation.limits import Limits
+from friction_ocp.excitation.motions import Motion
 from friction_ocp.recording import recording as log
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares

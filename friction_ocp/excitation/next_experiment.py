@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friction_ocp.design.design import Design, Option, separating
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Tell
 from friction_ocp.diagnosis.select import shown
+from friction_ocp.excitation.design import Design, Option, separating
 
 _EXCITATION = {
     "stribeck": "speeds from well below to well above the Stribeck speed, slowly and in both directions",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from xml.sax.saxutils import quoteattr
 
-from friction_ocp.export.joints import Joint, JointDrive, Loss
-from friction_ocp.export.mjcf import GRAVITY
+from friction_ocp.targets.joints import Joint, JointDrive, Loss
+from friction_ocp.targets.mjcf import GRAVITY
 
 
 def urdf_losses(drive: JointDrive) -> tuple[Loss, ...]:

@@ -10,10 +10,10 @@ import numpy as np
 from friction_ocp.drive.parts import Drive, ExternalTorque
 from friction_ocp.drive.steady import reference_shaft, steady_speeds
 from friction_ocp.drive.stepping import stepped
-from friction_ocp.export.c_source import compensation, compensation_width
-from friction_ocp.export.fitted import Fitted, Run, flat, rms
 from friction_ocp.recording.conditioning import smooth_motion
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
+from friction_ocp.targets.c_source import compensation, compensation_width
+from friction_ocp.targets.fitted import Fitted, Run, flat, rms
 
 
 @dataclass(frozen=True)

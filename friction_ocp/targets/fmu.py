@@ -15,9 +15,9 @@ from xml.sax.saxutils import quoteattr
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.export.c_source import CSource, c_source
-from friction_ocp.export.fitted import Fitted
 from friction_ocp.simulation.compiled import compiler
+from friction_ocp.targets.c_source import CSource, c_source
+from friction_ocp.targets.fitted import Fitted
 
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
 _TOO_MANY = 1000

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
-from friction_ocp.export.joints import Actuator, Joint, JointDrive, Spring
+from friction_ocp.targets.joints import Actuator, Joint, JointDrive, Spring
 
 GRAVITY = 9.81
 STEP = 5e-4

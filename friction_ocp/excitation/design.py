@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Literal
 
 import numpy as np
 
-from friction_ocp.design.limits import Limits, limits_of
-from friction_ocp.design.motions import MOTIONS
-from friction_ocp.design.trial_run import TrialRun, trial_run
-from friction_ocp.design.worth import Evidence, evidence, information, known_information
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
@@ -21,6 +17,10 @@ from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.excitation.limits import Limits, limits_of
+from friction_ocp.excitation.motions import MOTIONS
+from friction_ocp.excitation.trial_run import TrialRun, trial_run
+from friction_ocp.excitation.worth import Evidence, evidence, information, known_information
 from friction_ocp.simulation.grid import FloatArray
 
 Criterion = Literal["D", "A", "separation"]
@@ -53,14 +53,20 @@ class Design:
     options: tuple[Option, ...]
     std_errors: FloatArray
     """(parameters,) with the recordings at hand."""
+    between: tuple[Key, ...] = ()
+    """Candidates that were named to be told apart."""
 
 
-def designed(
-    problem: Problem, criterion: Criterion, between: Sequence[Key], tell: Tell = lambda what, share: None
+def design(
+    problem: Problem,
+    criterion: Criterion = "D",
+    between: Sequence[Key] = (),
+    tell: Tell = lambda what, share: None,
 ) -> Design:
     """Find what to record for a problem: to sharpen its parameters or, where candidates are named, to tell them apart.
 
-    Raises FrictionOcpError where one is named that there is not, or only one.
+    `between` names them as pairs of effect and component, such as ("stribeck", "motor"). Raises FrictionOcpError where
+    one is named that there is not, or only one.
     """
     tell("base model", 0.0)
     base = fit_base(prepare(problem))
@@ -79,7 +85,7 @@ def designed(
     clues, blocks = clues_of(base), blocks_of(base.linear.rows)
     seen = [screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)]
     rivals = [completed(quick_refit(base, item)) for item in seen if item is not None and item.starts]
-    return separating(base, rivals, tell)
+    return replace(separating(base, rivals, tell), between=tuple(between))
 
 
 def _nearest(name: str, known: Sequence[Key]) -> str:

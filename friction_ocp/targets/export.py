@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.export.c_source import CompiledModel, c_source
-from friction_ocp.export.fitted import Fitted
-from friction_ocp.export.fmu import write_fmu
-from friction_ocp.export.fmu_run import loaded_fmu
-from friction_ocp.export.joints import Loss, joint_drive
-from friction_ocp.export.mjcf import STEP, STIFF, mjcf_text
-from friction_ocp.export.mujoco_run import MuJoCoRun
-from friction_ocp.export.price import PriceRow, price_table
-from friction_ocp.export.table import table_text
-from friction_ocp.export.urdf import urdf_losses, urdf_text
+from friction_ocp.targets.c_source import CompiledModel, c_source
+from friction_ocp.targets.fitted import Fitted, load_fitted
+from friction_ocp.targets.fmu import write_fmu
+from friction_ocp.targets.fmu_run import loaded_fmu
+from friction_ocp.targets.joints import Loss, joint_drive
+from friction_ocp.targets.mjcf import STEP, STIFF, mjcf_text
+from friction_ocp.targets.mujoco_run import MuJoCoRun
+from friction_ocp.targets.price import PriceRow, price_table
+from friction_ocp.targets.table import table_text
+from friction_ocp.targets.urdf import urdf_losses, urdf_text
 from friction_ocp.whole_file import whole_file
 
 
@@ -38,14 +38,14 @@ class Exported:
 Target = Callable[[Fitted, Path], Exported]
 
 
-def export(fitted: Fitted, kind: str, path: Path) -> Exported:
-    """Write a fitted drive for a target; raises FrictionOcpError for an unknown one."""
-    target = TARGETS.get(kind)
+def export(result: Fitted | str | Path, to: str, path: str | Path) -> Exported:
+    """Write a fitted drive, or that of a result on disk, for a target; raises FrictionOcpError for an unknown one."""
+    target = TARGETS.get(to)
     if target is None:
-        raise FrictionOcpError(Finding("export", f"unknown target '{kind}'", f"available: {', '.join(TARGETS)}"))
-    if path.is_dir():
+        raise FrictionOcpError(Finding("export", f"unknown target '{to}'", f"available: {', '.join(TARGETS)}"))
+    if Path(path).is_dir():
         raise FrictionOcpError(Finding(str(path), "this is a folder", "a file to write"))
-    return target(fitted, path)
+    return target(result if isinstance(result, Fitted) else load_fitted(result), Path(path))
 
 
 def _mjcf(fitted: Fitted, path: Path) -> Exported:
