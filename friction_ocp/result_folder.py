@@ -25,11 +25,23 @@ def save(result: Estimate | Simulation | Statistic, folder: str | Path) -> Path:
         best = result.candidates[0].estimate if isinstance(result, Comparison) else result.estimate
         write_results(target, statistic_document(result), simulation_series(best.simulation))
     elif isinstance(result, Estimate):
-        fitted = fitted_problem(result, target)
-        write_results(target, estimate_document(result), simulation_series(result.simulation), fitted)
+        fitted, document = fitted_problem(result, target), estimate_document(result)
+        document["friction_compensation"] = friction_compensation(result)
+        write_results(target, document, simulation_series(result.simulation), fitted)
     else:
         write_results(target, simulation_document(result), simulation_series(result))
     return target
+
+
+def friction_compensation(estimate: Estimate) -> dict[str, Any] | None:
+    """Return what cancelling the friction is predicted to buy; None where no controller follows a recorded angle."""
+    from friction_ocp.targets.fitted import fitted_of
+    from friction_ocp.targets.tracking import follows, tracking_document, tracking_gain
+
+    if not (follows(estimate.problem.drive) and estimate.converged):
+        return None
+    fitted = fitted_of(estimate)
+    return tracking_document(fitted, tracking_gain(fitted))
 
 
 def fitted_problem(estimate: Estimate, folder: Path) -> str | None:

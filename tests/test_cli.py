@@ -78,6 +78,18 @@ def test_identify_leaves_every_result(identified: Ran) -> None:
     assert not [name for name in files if name.endswith(".tmp")]
 
 
+def test_identify_predicts_what_compensation_buys(identified: Ran) -> None:
+    """A drive that follows a reference: its tracking error, as measured and as simulated, in the result and the page."""
+    found = identified.result["friction_compensation"]
+    assert found["shaft"] == "servo"
+    (tracking,) = found["tracking_rms"].values()
+    assert tracking["before"] == pytest.approx(tracking["measured"], rel=0.2)
+    assert tracking["gain"] == pytest.approx(1.0 - tracking["after"] / tracking["before"])
+    page = (identified.folder / "report.html").read_text(encoding="utf-8")
+    assert "What friction compensation buys" in page
+    assert "off the tracking error" in page
+
+
 def test_json_is_the_result_and_nothing_else(identified: Ran) -> None:
     """--json prints result.json, letter by letter."""
     assert identified.out.rstrip("\n") == (identified.folder / "result.json").read_text(encoding="utf-8").rstrip("\n")

@@ -14,6 +14,7 @@ from friction_ocp.plots import palette
 from friction_ocp.plots.numbers import plain
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
+from friction_ocp.report.compensation import compensation_section
 from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
 from friction_ocp.report.statistics import drawn_section, whole_verdict
 from friction_ocp.report.tables import (
@@ -70,6 +71,7 @@ def render_report(result: Json, series: Series) -> str:
             "recordings": _recordings(result, series),
             "friction": friction,
             "friction_json": embedded_json(friction),
+            "compensation": compensation_section(result),
             "residuals": objects(result, "residuals"),
             "correlation": correlation_rows(part(result, "correlation")),
             "solver": facts(solver),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from friction_ocp.report.compensation import compensation_sentence
 from friction_ocp.report.section import table_lines
 from friction_ocp.report.statistics import statistic_section, whole_verdict
 
@@ -24,6 +25,8 @@ def summary(result: Mapping[str, Any]) -> str:
         lines.append(f"free run, training    {name}: {_error(errors)}")
     for name, errors in result["fit"]["validation"].items():
         lines.append(f"free run, validation  {name}: {_error(errors)}")
+    if sentence := compensation_sentence(result):
+        lines += ["", sentence]
     return "\n".join(lines)
 
 

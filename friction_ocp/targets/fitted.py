@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -16,7 +16,7 @@ from friction_ocp.drive.live_terms import live_terms
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.estimate import Simulation, simulate_model
+from friction_ocp.estimation.estimate import Estimate, Simulation, simulate_model
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.model import Model, prepare
@@ -47,6 +47,8 @@ class Fitted:
     """A fitted drive."""
 
     model: Model
+    theta: FloatArray
+    """(parameters,) the answer."""
     drive: Drive
     """With plain numbers: those of the first recording, where recordings differ."""
     name: str
@@ -56,7 +58,7 @@ class Fitted:
     @cached_property
     def simulation(self) -> Simulation:
         """Free runs of all recordings."""
-        return simulate_model(self.model, self.model.space.guess)
+        return simulate_model(self.model, self.theta)
 
     def runs(self) -> tuple[Run, ...]:
         """Return the free runs by which an export is judged: validation recordings, else those of the training."""
@@ -67,23 +69,37 @@ class Fitted:
 
     def numbers(self, recording: str) -> FloatArray:
         """Return all numbers of the drive in a recording."""
-        return self.model.space.numbers(self.model.space.guess, recording)
+        return self.model.space.numbers(self.theta, recording)
 
 
 def load_fitted(result: str | Path) -> Fitted:
     """Read a result folder, its result.json, or a problem file that holds its answer."""
     path = _problem_of(Path(result))
     model = prepare(load_problem(path))
+    return _fitted(model, model.space.guess, path.parent.name if path.name in PROBLEMS else path.stem, path)
+
+
+def fitted_of(estimate: Estimate) -> Fitted:
+    """Return the drive that an identification found."""
+    problem = estimate.problem
+    same_steps = replace(problem.estimation, max_step=estimate.simulation.max_step)
+    model = prepare(replace(problem, estimation=same_steps))
+    theta = np.array([estimate.values[name] for name in model.space.names])
+    path = problem.path or Path("drive")
+    return _fitted(model, theta, path.stem, path)
+
+
+def _fitted(model: Model, theta: FloatArray, title: str, path: Path) -> Fitted:
     space = model.space
     first = model.problem.fitted[0].name
-    numbers = dict(zip(space.leaf_names, space.numbers(space.guess, first), strict=True))
+    numbers = dict(zip(space.leaf_names, space.numbers(theta, first), strict=True))
     stated = {leaf.path: leaf.value for leaf in drive_leaves(model.problem.drive)}
     plain = {name: float(value) for name, value in stated.items() if isinstance(value, (int, float))}
     drive = live_terms(bind_drive(model.problem.drive, plain | {name: float(value) for name, value in numbers.items()}))
     for leaf in drive_leaves(drive):
         assert not isinstance(leaf.value, (Free, Tie)), leaf.path
-    name = re.sub(r"\W+", "_", path.parent.name if path.name in PROBLEMS else path.stem).strip("_") or "drive"
-    return Fitted(model, drive, name if not name[0].isdigit() else f"drive_{name}", path)
+    name = re.sub(r"\W+", "_", title).strip("_") or "drive"
+    return Fitted(model, theta, drive, name if not name[0].isdigit() else f"drive_{name}", path)
 
 
 def _problem_of(result: Path) -> Path:

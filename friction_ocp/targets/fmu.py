@@ -71,7 +71,7 @@ def _whole_source(fitted: Fitted, source: CSource) -> str:
         assert controller is not None and controller.sample_time is not None
         defines += [f"#define MODEL_TICK {name}_tick", f"#define SAMPLE_TIME {controller.sample_time!r}"]
         defines += [f"#define DELAY {float(controller.delay)!r}"]
-    wrapper = files("friction_ocp.export").joinpath("fmu.c").read_text(encoding="utf-8")
+    wrapper = files("friction_ocp.targets").joinpath("fmu.c").read_text(encoding="utf-8")
     return "\n".join((source.whole, *defines, wrapper))
 
 

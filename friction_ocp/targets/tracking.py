@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from friction_ocp.drive.parts import Drive, ExternalTorque
 from friction_ocp.drive.steady import reference_shaft, steady_speeds
-from friction_ocp.drive.stepping import stepped
+from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.recording.conditioning import smooth_motion
-from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
+from friction_ocp.simulation.interpreted import schedule
 from friction_ocp.targets.c_source import compensation, compensation_width
 from friction_ocp.targets.fitted import Fitted, Run, flat, rms
+
+MOST_NODES = 20_000
+"""Nodes that are simulated of all recordings together; of longer ones the beginning."""
 
 
 @dataclass(frozen=True)
 class Tracking:
-    """How far a drive stays behind its reference in one recording, root mean square."""
+    """How far a drive stays behind its reference in one recording while its motor is on, root mean square."""
 
     recording: str
     unit: str
+    measured: float
+    """As it was recorded."""
     before: float
+    """In the simulation."""
     after: float
+    """In the simulation with the compensation."""
+    seconds: float
+    """How much of the recording was simulated, from its start."""
 
     @property
     def gain(self) -> float:
@@ -34,35 +47,68 @@ class Tracking:
 def tracking_gain(fitted: Fitted) -> tuple[Tracking, ...]:
     """Simulate the closed loop with and without the exported compensation, fed with the speed of the reference.
 
-    The compensation acts as a torque on the shaft of the first motor beside that of the controller; what saturates
-    there, lags or has no power is not seen. Empty where no controller follows a recorded angle.
+    The compensation acts as a torque on the shaft of the first motor beside that of the controller, while the motor is
+    on; that it saturates or lags is not seen. Empty where no controller follows a recorded angle.
     """
     feedback = _feedback(fitted.drive)
     if feedback is None:
         return ()
     name, unit = feedback
     column = list(fitted.simulation.units).index(name)
-    rows: list[Tracking] = []
-    for run in fitted.runs():
-        reference = _reference(fitted, run)
-        errors = [_closed_loop(fitted, run, share)[:, column] - reference for share in (0.0, 1.0)]
-        rows.append(Tracking(run.item.name, unit, *(rms(error) for error in errors)))
-    return tuple(rows)
+    runs = fitted.runs()
+    most = MOST_NODES // len(runs)
+    return tuple(_tracking(fitted, run, unit, column, most) for run in runs)
+
+
+def _tracking(fitted: Fitted, run: Run, unit: str, column: int, most: int) -> Tracking:
+    time, reference, on = run.item.grid.time[:most], _reference(fitted, run)[:most], _enabled(fitted, run)[:most]
+    measured = rms((run.free.measured[:most, column] - reference)[on])
+    without, with_it = (_closed_loop(fitted, run, share, most)[:, column] - reference for share in (0.0, 1.0))
+    before, after = (float(np.sqrt(np.mean(error[on] ** 2))) if on.any() else 0.0 for error in (without, with_it))
+    return Tracking(run.item.name, unit, measured, before, after, float(time[-1] - time[0]))
+
+
+def tracking_document(fitted: Fitted, rows: Sequence[Tracking]) -> dict[str, Any]:
+    """Return what a result says of it, {} where nothing is predicted."""
+    if not rows:
+        return {}
+    found = {
+        row.recording: {
+            "unit": row.unit,
+            **{key: _number(getattr(row, key)) for key in ("measured", "before", "after", "gain")},
+            "seconds": row.seconds,
+        }
+        for row in rows
+    }
+    return {"shaft": reference_shaft(fitted.drive), "tracking_rms": found}
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def tracking_text(rows: Sequence[Tracking]) -> str:
     """Return the prediction in words."""
     lines = ["Friction compensation, simulated on the identified drive (rms distance to the reference):"]
     for row in rows:
-        sizes = f"{row.before:.4g} {row.unit} before, {row.after:.4g} after"
-        lines.append(f"  {row.recording}: {sizes} ({row.gain:.0%} less)")
+        sizes = f"{row.before:.3g} {row.unit} before, {row.after:.3g} {row.unit} after"
+        lines.append(f"  {row.recording}: {sizes}, {_change(row.gain)} (measured: {row.measured:.3g} {row.unit})")
     return "\n".join(lines)
+
+
+def _change(gain: float) -> str:
+    return f"{abs(gain):.1%} {'less' if gain >= 0 else 'more'}"
+
+
+def follows(drive: Drive) -> bool:
+    """Whether a controller makes a drive follow a recorded angle."""
+    return _feedback(drive) is not None
 
 
 def _feedback(drive: Drive) -> tuple[str, str] | None:
     """Return the output channel by which a controller follows a recorded angle, and its unit."""
-    follows = any(channel.measures == "reference.theta" for channel in drive.inputs)
-    if drive.controller is None or not follows or drive.controller.type == "pi_velocity":
+    led = any(channel.measures == "reference.theta" for channel in drive.inputs)
+    if drive.controller is None or not led or drive.controller.type == "pi_velocity":
         return None
     for channel in drive.outputs:
         if channel.name == drive.controller.feedback and channel.signal == "theta":
@@ -85,32 +131,68 @@ def _wanted_speed(fitted: Fitted, run: Run) -> FloatArray:
     return rate / steady_speeds(fitted.drive)[shaft]
 
 
-def _closed_loop(fitted: Fitted, run: Run, share: float) -> FloatArray:
-    """Return (n, outputs) with a share of the compensating torque on the motor's shaft."""
+def _enabled(fitted: Fitted, run: Run) -> BoolArray:
+    """Return (n,) whether the first motor is on."""
+    motor = fitted.drive.motors[0].name
+    names = fitted.model.drive.input_names
+    channels = [item.name for item in fitted.drive.inputs if item.measures == f"{motor}.enable"]
+    signals = run.item.grid.at_node
+    return signals[:, names.index(channels[0])] > 0.5 if channels else np.ones(len(signals), dtype=np.bool_)
+
+
+def _closed_loop(fitted: Fitted, run: Run, share: float, most: int) -> FloatArray:
+    """Return (nodes, outputs) with a share of the compensating torque on the motor's shaft, `most` nodes at most."""
     shaft = reference_shaft(fitted.drive)
     drive = stepped(_with_torque(fitted.model.problem.drive, shaft))
-    names = fitted.model.drive.parameter_names
-    known = dict(zip(names, run.numbers, strict=True))
+    p = _numbers(fitted, run, drive.parameter_names)
     constant = drive.parameter_names.index(f"{shaft}.external_torque.constant")
-    p = np.array([known.get(name, 0.0) for name in drive.parameter_names])
-    base = p[constant]
+    grid, nodes = run.item.grid, min(most, run.item.grid.time.size)
+    operations = schedule(grid, 0, nodes - 1, True)
+    torque = share * _compensating(fitted, run)[:nodes]
+    first = int(operations.node[0])  # the states of a free run are those after the ticks of its first node
+    later = np.arange(first, operations.controls.shape[1], dtype=np.int64)
+    owner = np.searchsorted(operations.node, later, side="right") - 1
+    controls = np.vstack([operations.controls[:, first:], torque[owner]])
+    x0 = run.free.states[0]
+    advance = _advance(drive, p, constant).mapaccum(controls.shape[1])
+    course = np.column_stack([x0, _array(advance(x0, controls))])
+    numbers = np.repeat(p[:, None], nodes, axis=1)
+    numbers[constant] += torque
+    width = np.zeros((_widths(drive), nodes))
+    states = course[:, operations.node - first]
+    return _array(drive.output.map(nodes)(states, grid.at_node[:nodes].T, numbers, operations.h[None, :], width)).T
+
+
+def _array(value: Any) -> FloatArray:
+    return np.asarray(value, dtype=np.float64)
+
+
+def _widths(drive: SteppedDrive) -> int:
+    return len(drive.mechanism.topology.roots) + 1
+
+
+def _advance(drive: SteppedDrive, p: FloatArray, constant: int) -> ca.Function:
+    """Return (state, operation) -> state after a step or a tick; the last row of an operation is a torque."""
+    inputs = len(drive.input_names)
+    x, operation = ca.MX.sym("x", len(drive.state_names)), ca.MX.sym("operation", inputs + 3)
+    u, (h, kind, torque) = operation[:inputs], (operation[inputs + k] for k in range(3))
+    numbers = ca.MX(ca.DM(p)) + ca.DM(np.eye(p.size)[constant]) * torque
+    after = drive.step(x, u, numbers, h, ca.DM.zeros(_widths(drive)))
+    if drive.tick is not None:
+        after = ca.if_else(kind > 0, drive.tick(x, u, numbers, kind), after, True)
+    return ca.Function("advance", [x, operation], [after])
+
+
+def _numbers(fitted: Fitted, run: Run, names: Sequence[str]) -> FloatArray:
+    known = dict(zip(fitted.model.drive.parameter_names, run.numbers, strict=True))
+    return np.array([known.get(name, 0.0) for name in names])
+
+
+def _compensating(fitted: Fitted, run: Run) -> FloatArray:
+    """Return (n,) the torque that cancels the friction at the speed of the reference, none while the motor is off."""
     friction = compensation(fitted).map(run.item.grid.time.size)
     torque = flat(friction(_wanted_speed(fitted, run)[None, :], compensation_width(fitted), run.numbers))
-    width = np.zeros(len(drive.mechanism.topology.roots) + 1)
-    grid, y = run.item.grid, np.full_like(run.free.simulated, np.nan)
-    x = run.free.states[0].copy()
-    for k in range(grid.time.size):
-        for kind in (APPLY, COMPUTE):
-            if drive.tick is not None and k and grid.ticks[k] & kind:
-                x = flat(drive.tick(x, grid.at_node[k], p, kind))
-        p[constant] = base + share * torque[k]
-        steps = int(grid.substeps[k])
-        h = float(grid.dt[k] or grid.dt[k - 1]) / steps
-        y[k] = flat(drive.output(x, grid.at_node[k], p, h, width))
-        for sub in range(steps if grid.dt[k] > 0 else 0):
-            u = grid.between(k, (sub + 0.5) / steps)
-            x = flat(drive.step(x, u, p, h, width))
-    return y
+    return torque * _enabled(fitted, run)
 
 
 def _with_torque(drive: Drive, name: str) -> Drive:

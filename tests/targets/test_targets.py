@@ -187,6 +187,19 @@ def test_compensation_is_predicted_to_shrink_the_tracking_error(tmp_path: Path) 
     assert 0.0 < row.after < row.before
 
 
+def test_without_compensation_the_loop_is_the_free_run(tmp_path: Path) -> None:
+    """What the prediction starts from is the closed loop as the sweep simulates it, while the motor is on."""
+    fitted = load_fitted(servo(tmp_path))
+    (row,), (run,) = tracking_gain(fitted), fitted.runs()
+    signals = dict(zip(fitted.model.drive.input_names, run.item.grid.at_node.T, strict=True))
+    channels = {item.measures: item.name for item in fitted.drive.inputs}
+    on = signals[channels["servo.enable"]] > 0.5 if "servo.enable" in channels else slice(None)
+    error = (run.free.simulated[:, 0] - signals[channels["reference.theta"]])[on]
+    assert row.before == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-9)
+    measured = (run.free.measured[:, 0] - signals[channels["reference.theta"]])[on]
+    assert row.measured == pytest.approx(float(np.sqrt(np.nanmean(measured**2))), rel=1e-9)
+
+
 def test_without_a_reference_nothing_is_predicted(tmp_path: Path) -> None:
     """A drive under a measured current follows nothing."""
     assert tracking_gain(load_fitted(axis(tmp_path))) == ()
