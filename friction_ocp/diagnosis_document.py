@@ -14,6 +14,7 @@ from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
+from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.select import Rival, probabilities
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
@@ -249,6 +250,7 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
         f"{shaft}: torque noise {density:.3g} N m/sqrt(Hz), from the measured inputs and what the file states"
         for shaft, density in foot.density.items()
     ]
+    lines += [] if diagnosis.stated is None else corrections(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
     lines.append(f"the catalogue: {', '.join(effects())}")
     return lines

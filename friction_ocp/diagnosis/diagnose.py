@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
+from friction_ocp.diagnosis.reading import other_reading
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
@@ -71,6 +72,8 @@ class Diagnosis:
     slow: tuple[SlowTorque, ...]
     """Slow torques that the final model lacks, by shaft."""
     seconds: float
+    stated: Problem | None = None
+    """The problem as it was given, where its inputs are not read as it states."""
 
     @property
     def gap(self) -> bool:
@@ -122,6 +125,22 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive.
 
+    Where the inputs, read the other way between their samples, leave less to explain, that is how they are read.
+    """
+    stated, other = _diagnosed(problem, tell, execution), other_reading(problem)
+    if other is None or not stated.gap:
+        return stated
+    power = _innovations(open_bench(other, execution).base)
+    if power.ratio >= stated.rounds[0].excess.ratio:
+        return stated
+    read = _diagnosed(other, tell, execution)
+    simpler = (read.left_over, len(read.accepted)) < (stated.left_over, len(stated.accepted))
+    return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
+
+
+def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
+    """Find what a model lacks, the inputs read as the problem says.
+
     The base fit, score tests and refits of a round are tasks: in whatever process, with the same numbers, and taken
     from the output folder where an earlier run ended them.
     """
@@ -151,7 +170,6 @@ def diagnose(
     current, checked = _checked(bench.current, level)
     rounds += checked
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
-    rows = current.linear.rows
     return Diagnosis(
         problem=problem,
         base=base,
@@ -161,10 +179,15 @@ def diagnose(
         level=level,
         before=free_errors(base, held_out=True),
         after=free_errors(current, held_out=True),
-        remainder=excess(rows, blocks_of(rows)),
+        remainder=_innovations(current),
         slow=slow_torques(current, clues_of(current)),
         seconds=time.perf_counter() - began,
     )
+
+
+def _innovations(fitted: FittedModel) -> Excess:
+    rows = fitted.linear.rows
+    return excess(rows, blocks_of(rows))
 
 
 def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Round]]:
@@ -174,7 +197,7 @@ def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Roun
     """
     rounds = list[Round]()
     for _ in range(MOST_ROUNDS):
-        power = excess(current.linear.rows, blocks_of(current.linear.rows))
+        power = _innovations(current)
         found = [] if power.significant(level) else contradictions(current)
         if not found:
             break

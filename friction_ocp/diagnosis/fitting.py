@@ -12,6 +12,7 @@ from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.diagnosis.screen import Screened, Start
+from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
@@ -84,7 +85,8 @@ def fit_base(model: Model) -> FittedModel:
     foot = footing(model, end.theta)
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
-    return freed(polished(model, foot, end.theta, nodes if foot.train is program.experiments else None))
+    started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
+    return freed(_from_rest(started))
 
 
 def _free_base(model: Model, rough: Footing) -> FittedModel:
@@ -92,7 +94,16 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
     starts = [model.space.guess, _rough_answer(model)[1].theta]
     best = min((polished(model, rough, theta, None, COARSE) for theta in starts), key=lambda end: end.objective)
     foot = footing(model, best.theta)
-    return freed(polished(model, foot, best.theta, best.linear.point.nodes))
+    return freed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes)))
+
+
+def _from_rest(fitted: FittedModel) -> FittedModel:
+    """Fit again from recordings that start at rest, where that costs less."""
+    program, point = fitted.linear.program, fitted.linear.point
+    resting = settled(program, point)
+    if program.objective(resting) >= program.objective(point):
+        return fitted
+    return polished(fitted.model, fitted.footing, fitted.theta, resting.nodes)
 
 
 def _rough_answer(model: Model) -> tuple[Program, Point]:
@@ -117,7 +128,7 @@ def polished(
     theta = model.space.clip(theta)
     point = Point(theta, program.suggested_nodes(theta) if nodes is None else nodes)
     if nodes is None:
-        point = solve_nodes(program, point)
+        point = settled(program, solve_nodes(program, point))
     if not theta.size:
         return FittedModel(model, foot, linear_program(program, solve_nodes(program, point)))
     end = solve_gauss_newton(program, point, limits)
@@ -202,7 +213,7 @@ def held_out(fitted: FittedModel) -> FloatArray:
     """
     program = fitted.linear.program
     costs: dict[int, FloatArray] = {}
-    for group in _folds(fitted):
+    for group in folds(fitted):
         theta = _without(fitted, group)
         for k in group:
             item = fitted.linear.recordings[k]
@@ -243,7 +254,7 @@ def _around_kinks(model: Model, program: Program, point: Point, limits: Toleranc
     return solve_gauss_newton(program, solve_gauss_newton(rounded, point, COARSE).point, limits)
 
 
-def _folds(fitted: FittedModel) -> list[list[int]]:
+def folds(fitted: FittedModel) -> list[list[int]]:
     """Return the recordings that are left out together.
 
     Those made under the same conditions, where the problem states different ones (`set`): a model that only fits two

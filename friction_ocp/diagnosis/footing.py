@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel, Motor
 from friction_ocp.estimation.experiment import Experiment
@@ -27,10 +28,14 @@ linalg: Any = _linalg  # its own types are incomplete
 
 FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
-SHORTEST, LONGEST = 5, 50
+SHORTEST, LONGEST = 2, 50
 """Samples in a segment."""
-MOST_SEGMENTS = 400
-"""In one recording; more would cost time and tell no more."""
+MOST_SEGMENTS, MOST_CUTS = 1000, 200
+"""In one recording, and intervals of doubtful torque that are cut out; more would cost time and tell no more."""
+WITHIN = 0.01
+"""Variance that torque noise may add within a segment over that of a channel. What it does there counts as noise of the
+channel, and again in the gap behind: with as much as the channel's own, slow torques look twice as certain as they
+are."""
 NUMERICAL_INPUT = 1e-3
 """Error of a measured input over its rms, sample by sample, that a simulation between samples makes anyway."""
 SMOOTH = 4.0 * np.sqrt(6.0)
@@ -105,9 +110,11 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
 
 
 def training_pieces(model: Model) -> tuple[Experiment, ...]:
-    """Return the training recordings, or pieces of the only one."""
+    """Return the training recordings, or pieces of the only one, without samples beside jumps."""
     first, *others = model.train
-    return model.train if others else tuple(pieces(first, FOLDS))
+    whole = model.train if others else tuple(pieces(first, FOLDS))
+    outputs = model.drive.mechanism.drive.outputs
+    return tuple(without_jumps(item, outputs, model.noise) for item in whole)
 
 
 def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:
@@ -266,7 +273,7 @@ def input_impulses(model: Model, item: Experiment, numbers: Mapping[str, float])
 
 def with_cuts(first: IntArray, power: FloatArray) -> IntArray:
     """Add cuts around the intervals whose torque is most in doubt, so that nothing else bears it."""
-    largest = np.argsort(power)[::-1][: MOST_SEGMENTS // 2]
+    largest = np.argsort(power)[::-1][:MOST_CUTS]
     doubtful = largest[power[largest] > 0]
     return np.unique(np.concatenate([first, doubtful, doubtful + 1]).clip(0, first[-1])).astype(np.int64)
 
@@ -290,10 +297,12 @@ def still_gaps(model: Model, foot: Footing, recording: str, span: float) -> Floa
 
 
 def _segment_length(model: Model, foot: Footing, item: Experiment) -> float:
-    """Return the longest segments, s, in which torque noise moves no channel by more than its noise floor."""
+    """Return the longest segments, s, in which torque noise hardly moves a channel."""
     step = float(np.median(np.diff(item.grid.time)))
     lengths = np.unique(np.geomspace(SHORTEST, LONGEST, 12).round()) * step
-    fitting = [length for length in lengths if np.all(_within(model, foot, item, float(length)) <= model.noise**2)]
+    fitting = [
+        length for length in lengths if np.all(_within(model, foot, item, float(length)) <= WITHIN * model.noise**2)
+    ]
     return float(max(fitting, default=lengths[0]))
 
 

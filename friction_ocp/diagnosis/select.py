@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitting import FittedModel, folds
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 
@@ -78,14 +78,15 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
 
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
-    parameter takes off a factor e beforehand (Akaike 1973); rivals that leave the same residuals share what they have.
+    parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`); rivals that leave the
+    same residuals share what they have.
     """
     if not rivals:
         return Choice((), (), 1.0, False, ())
     draws = resamples(blocks, rng)
     totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in rivals)])
     shares = _weights(totals).mean(axis=0)
-    chances = _shared(rivals, shares[1:])
+    chances = _shared(rivals, shares[1:], price(blocks, len(folds(rivals[0].fitted))))
     order = sorted(range(len(rivals)), key=lambda k: -chances[k])
     ordered = [rivals[k] for k in order]
     best = totals[:, order[0] + 1]
@@ -109,12 +110,26 @@ def is_same(one: Rival, other: Rival) -> bool:
     return left[0].size == left[1].size and 0.5 * float(np.sum((left[0] - left[1]) ** 2)) < TOLD
 
 
-def _shared(rivals: Sequence[Rival], shares: FloatArray) -> list[float]:
+def price(blocks: Blocks, parts: int) -> float:
+    """Return what a parameter costs beside the likelihood of what was held out.
+
+    The marginal likelihood falls by half the logarithm of the number of independent observations for every parameter
+    that the data determine (Schwarz 1978); that number is the number of blocks. What is held out, one of `parts` parts
+    at a time, has charged some of it: half a unit that the fit gained by following noise, and half of parts/(parts - 1)
+    for the error of parameters fitted to the other parts (Stone 1977).
+    """
+    charged = 0.5 + 0.5 * parts / max(parts - 1, 1)
+    return max(0.5 * float(np.log(max(blocks.count, 1))) - charged, 0.0)
+
+
+def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[float]:
     """Return probabilities in which those of the same residuals divide what they have together."""
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    weights = np.array([np.exp(-float(rival.fitted.theta.size + _blames_sensor(rival))) for rival in rivals])
+    weights = np.array(
+        [np.exp(-each * float(rival.fitted.theta.size) - float(_blames_sensor(rival))) for rival in rivals]
+    )
     weights = weights / weights.max()
     shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
     found = list[float]()

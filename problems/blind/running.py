@@ -39,12 +39,12 @@ def command(*arguments: str | Path, limit: float = TIME_LIMIT) -> None:
         raise Failed(f"exit status {done.returncode}: {' | '.join(said)}")
 
 
-def diagnosed(problem: Path, folder: Path) -> tuple[dict[str, Any], float]:
+def diagnosed(problem: Path, folder: Path, workers: int = 2) -> tuple[dict[str, Any], float]:
     """Return the result of `diagnose` and its time, s; what is on disk is not run again."""
     timing = folder / "timing.json"
     if not timing.exists():
         began = time.perf_counter()
-        command("diagnose", problem, "--out", folder)
+        command("diagnose", problem, "--out", folder, "--workers", str(workers))
         write_json(timing, {"seconds": time.perf_counter() - began})
     return _json(folder / "result.json"), float(_json(timing)["seconds"])
 

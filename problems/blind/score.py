@@ -1,6 +1,6 @@
 """Score `friction-ocp diagnose` on blind cases.
 
-python problems/blind/score.py --seed N [--cases M] [--out DIR] [--baselines all|correlation|none]
+python problems/blind/score.py --seed N [--cases M] [--out DIR] [--baselines all|correlation|none] [--workers W]
 
 Makes the cases of a seed, diagnoses each through the command line, opens the answers, and prints the table; DIR gets
 score.json and confusion.png. What is on disk is not done again: a score that was stopped goes on at the case where it
@@ -50,10 +50,10 @@ def purpose(seed: int) -> str:
     return "report"
 
 
-def score_case(case: Case, folder: Path, baselines: Sequence[str]) -> tuple[Judged, Checked]:
+def score_case(case: Case, folder: Path, baselines: Sequence[str], workers: int = 2) -> tuple[Judged, Checked]:
     """Diagnose a case and check what its answer promises; raises Failed."""
     problem = folder / "cases" / case.name / "problem.yaml"
-    result, seconds = diagnosed(problem, folder / "diagnoses" / case.name)
+    result, seconds = diagnosed(problem, folder / "diagnoses" / case.name, workers)
     judged = judge(read_answer(folder, case.name), named(result, seconds))
     memory = folder / "checks" / f"{case.name}.json"
     known = json.loads(memory.read_text(encoding="utf-8")) if memory.exists() else {}
@@ -89,6 +89,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=168)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--baselines", choices=list(CHOICES), default="all")
+    parser.add_argument("--workers", type=int, default=2, help="processes of a diagnosis")
     options = parser.parse_args()
     try:
         what = purpose(options.seed)
@@ -101,7 +102,7 @@ def main() -> int:
     for index in range(options.cases):
         case = make(options.seed, index, folder)
         try:
-            row, checked[case.name] = score_case(case, folder, CHOICES[options.baselines])
+            row, checked[case.name] = score_case(case, folder, CHOICES[options.baselines], options.workers)
         except Failed as error:
             failed += 1
             print(f"{case.name}  failed: {error}", flush=True)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
 
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import fit_base
-from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
+from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, slow_torques
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -26,9 +27,12 @@ def found(path: Path) -> SlowTorque:
     return one
 
 
-def test_noise_is_no_slow_torque(tmp_path: Path) -> None:
-    """A model that lacks nothing passes."""
-    assert found(write_case(tmp_path, axis())).p_value > 0.01
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_is_no_slow_torque(seed: int, tmp_path: Path) -> None:
+    """A model that lacks nothing passes: noise of the current is counted once."""
+    one = found(write_case(tmp_path, axis(), seed))
+    assert one.p_value > 0.01
+    assert one.ratio == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / (2 * STRETCHES)))
 
 
 def test_gusts_are_seen(tmp_path: Path) -> None:

@@ -1,0 +1,81 @@
+"""What a derivative cannot see: that a recording starts at rest, and the instant at which an acceleration jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.drive.parts import Channel
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.simulation.grid import BoolArray, FloatArray
+
+STEPS = 15
+"""Of the nodes of a recording from a start at rest."""
+CLEAR = 4.0 * np.sqrt(6.0)
+"""Jump over the noise of a channel that noise alone does not make: four deviations of a second difference."""
+
+
+def settled(program: Program, point: Point) -> Point:
+    """Return the point with recordings started at rest where that costs less.
+
+    A shaft that slides at a hundredth of a radian a second in the model, and sticks in truth, stays wrong: until it
+    stops, friction has the wrong sign, and no derivative shows that a stop would end it.
+    """
+    nodes = list(point.nodes)
+    for k, cut in enumerate(program.segments):
+        if cut.measured == 0:
+            nodes[k] = _settled_start(_alone(program, k), Point(point.theta, (nodes[k],))).nodes[0]
+    return Point(point.theta, tuple(nodes))
+
+
+def _alone(program: Program, index: int) -> Program:
+    at = slice(index, index + 1)
+    return replace(program, experiments=program.experiments[at], segments=program.segments[at])
+
+
+def _settled_start(program: Program, point: Point) -> Point:
+    best, cost = point, program.objective(point)
+    measured = program.suggested_nodes(point.theta)[0][0]
+    for columns in _stops(program):
+        start = point.nodes[0].copy()
+        start[0] = measured
+        start[0, columns] = 0.0
+        trial = solve_nodes(program, Point(point.theta, (start,)), STEPS)
+        after = program.objective(trial)
+        if after < cost:
+            best, cost = trial, after
+    return best
+
+
+def _stops(program: Program) -> list[list[int]]:
+    """Return the columns of speeds that may be zero together: all of them, or that of one group of shafts."""
+    mech = program.drive.mechanism
+    speeds = [len(mech.angle_groups) + k for k in range(len(mech.free_groups))]
+    return [speeds] if len(speeds) == 1 else [speeds, *([one] for one in speeds)]
+
+
+def without_jumps(item: Experiment, outputs: Sequence[Channel], noise: FloatArray) -> Experiment:
+    """Return a recording without the samples of accelerations on both sides of a jump.
+
+    Friction changes its sign between two samples; which of them a simulation finds behind the jump is chance.
+    """
+    measured = item.measured.copy()
+    for k, channel in enumerate(outputs):
+        if channel.signal == "alpha":
+            measured[beside_jumps(measured[:, k], float(noise[k])), k] = np.nan
+    return replace(item, measured=measured)
+
+
+def beside_jumps(values: FloatArray, noise: float) -> BoolArray:
+    """Return (n,) whether a sample lies next to a step that its neighbours, both together, do not come up to."""
+    step = np.abs(np.diff(values))
+    around = np.pad(step, 1)
+    jump = step > around[:-2] + around[2:] + CLEAR * noise
+    found = np.zeros(values.size, dtype=bool)
+    found[:-1] |= jump
+    found[1:] |= jump
+    return found
