@@ -10,7 +10,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, samples
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
@@ -117,7 +117,7 @@ def _curve(found: Shape) -> dict[str, Any]:
 
 def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
     gap = item.accepted is not None or item.excess.significant(diagnosis.level) or diagnosis.left_over
-    available = max(item.before.objective - 0.5 * _samples(item), 1e-300)
+    available = max(item.before.objective - 0.5 * samples(item.before), 1e-300)
     pairs = zip(item.choice.rivals, item.choice.probabilities, strict=True)
     causes = [_cause(item, rival, chance, available) for rival, chance in pairs]
     refitted = {rival.key for rival in item.choice.rivals}
@@ -162,11 +162,6 @@ def _own(before: FittedModel, fitted: FittedModel) -> set[str]:
         return new
     stated = [dict(zip(item.space.names, item.space.prior_std, strict=True)) for item in (before.model, fitted.model)]
     return {name for name, std in stated[0].items() if math.isfinite(std) and not math.isfinite(stated[1][name])}
-
-
-def _samples(item: Round) -> int:
-    rows = item.before.linear.rows
-    return int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
 
 
 def _share(gain: float, available: float) -> float:

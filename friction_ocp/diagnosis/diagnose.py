@@ -40,6 +40,12 @@ FINISHED, CLOSE = 2, 1.5
 this factor."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
+OF_ALL, OF_REST = 0.1, 0.4
+"""Share of the excess that the base model left, or of what is left, that an addition must explain, one or the other: a
+law of another shape than the machine's leaves up to a fifth of its own effect, which is no further effect; of two
+effects of one size each explains half, and of that the same four fifths."""
+HOPE = 0.25
+"""Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
 Key = tuple[str, str]
 
@@ -159,7 +165,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
                 number,
                 lambda what, share, n=number: tell(f"round {n}: {what}", share),
             )
-            done = _round(crew, names, level, rng)
+            done = _round(crew, names, level, rng, _required(base, bench.current))
             rounds.append(done)
             if done.accepted is None:
                 break
@@ -253,24 +259,38 @@ def _options(problem: Problem) -> tuple[float, list[str]]:
     return float(level), [str(name) for name in wanted if name not in left_out]
 
 
-def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator) -> Round:
+def _required(base: FittedModel, current: FittedModel) -> float:
+    """Return the decrease of the objective that makes an addition an effect of its own."""
+    whole, rest = (max(item.objective - 0.5 * samples(item), 0.0) for item in (base, current))
+    return min(OF_ALL * whole, OF_REST * rest)
+
+
+def samples(fitted: FittedModel) -> int:
+    """Return the number of samples that an objective counts."""
+    rows = fitted.linear.rows
+    return int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
+
+
+def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator, required: float) -> Round:
     current, blocks = crew.bench.current, crew.bench.blocks
     places = [(effect.name, place) for effect, place in candidates(current.model.problem.drive, names)]
     found = crew.screened(places)
     power = excess(current.linear.rows, blocks)
-    shortlist = _shortlist(found, level, power.significant(level))
+    hopeful = [item for item in found if item.gain >= HOPE * required]
+    shortlist = _shortlist(hopeful, PLAUSIBLE if power.significant(level) else level / max(len(found), 1))
     choice = choose(_rivals(crew, shortlist), blocks, level, rng)
-    accepted = choice.rivals[0] if choice.significant and _is_material(current, choice.rivals[0].fitted) else None
-    return Round(tuple(found), choice, current, power, accepted)
+    best = choice.rivals[0] if choice.significant else None
+    if best is not None and (float(np.sum(best.gains)) < required or not _is_material(current, best.fitted)):
+        best = None
+    return Round(tuple(found), choice, current, power, best)
 
 
-def _shortlist(found: Sequence[Screened], level: float, gap: bool) -> list[Screened]:
+def _shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
     """Return candidates that are worth a refit.
 
-    Where there is a gap for certain, a mere sign of significance is enough: the decision is made on recordings left
-    out. Otherwise a candidate must be significant after correction for the number of candidates (Bonferroni).
+    Where there is a gap for certain, a mere sign of significance is enough as the limit: the decision is made on
+    recordings left out. Otherwise it is corrected for the number of candidates (Bonferroni).
     """
-    limit = PLAUSIBLE if gap else level / max(len(found), 1)
     significant = [item for item in found if item.p_value < limit and item.gain > 0]
     if not significant:
         return []

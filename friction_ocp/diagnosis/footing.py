@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -103,7 +103,7 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     found: list[Experiment] = []
     for begin, end in pairwise(edges):
         at = slice(begin, end + 1)
-        grid = replace(item.grid, **{key: value[at] for key, value in vars(item.grid).items()})
+        grid = replace(item.grid, **{part.name: getattr(item.grid, part.name)[at] for part in fields(item.grid)})
         kept = {name: getattr(item, name)[at] for name in ("measured", "smooth", "rate", "curvature")}
         found.append(replace(item, grid=grid, **kept))
     return found

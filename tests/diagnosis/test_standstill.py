@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from diagnosis_cases import axis, write_case
+import pytest
+from diagnosis_cases import COULOMB, axis, write_case
 
 from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.footing import FOLDS
 from friction_ocp.diagnosis.standstill import beside_jumps, settled
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.program import Point
@@ -36,3 +38,12 @@ def test_only_samples_beside_a_jump_are_found() -> None:
     assert not np.any(beside_jumps(wave, 0.01))
     wave[700:] += 0.5
     assert np.flatnonzero(beside_jumps(wave, 0.01)).tolist() == [699, 700]
+
+
+def test_the_only_recording_is_cut_into_pieces(tmp_path: Path) -> None:
+    """Where there is one training recording its pieces are fitted together, as recordings are."""
+    path = write_case(tmp_path, axis())
+    path.write_text(path.read_text(encoding="utf-8").replace("  - a.h5\n  - b.h5\n", "  - a.h5\n"), encoding="utf-8")
+    fitted = fit_base(prepare(load_problem(path)))
+    assert len(fitted.linear.recordings) == FOLDS
+    assert fitted.values["motor.friction.tau_c"] == pytest.approx(COULOMB, rel=0.02)
