@@ -79,7 +79,7 @@ def test_identify_leaves_every_result(identified: Ran) -> None:
 
 
 def test_identify_predicts_what_compensation_buys(identified: Ran) -> None:
-    """A drive that follows a reference: its tracking error, as measured and as simulated, in the result and the page."""
+    """A drive that follows a reference: its tracking error, measured and simulated, in result and page."""
     found = identified.result["friction_compensation"]
     assert found["shaft"] == "servo"
     (tracking,) = found["tracking_rms"].values()

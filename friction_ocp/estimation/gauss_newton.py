@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
-from friction_ocp.estimation.quadratic import bounded_step
+from friction_ocp.estimation.quadratic import bounded_step, linear_constraints
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-12, 1e12
@@ -60,6 +60,9 @@ class Tolerances:
     max_iterations: int = 100
 
 
+USUAL = Tolerances()
+
+
 @dataclass(frozen=True)
 class Trust:
     """How far the quadratic model is believed: the damping and the scale of the parameters that it acts on."""
@@ -89,7 +92,7 @@ class _Iterate:
 
 
 def solve_gauss_newton(
-    program: Program, start: Point, tolerances: Tolerances = Tolerances(), watch: Watch | None = None
+    program: Program, start: Point, tolerances: Tolerances = USUAL, watch: Watch | None = None
 ) -> Solution:
     """Minimise a program from a start; the start is moved inside the bounds first."""
     point = Point(program.space.clip(start.theta), start.nodes)
@@ -175,7 +178,7 @@ def trial_step(
     `scale` (parameters,) is what damping of the parameters is relative to; None takes the diagonal of the Hessian.
     """
     reduced = reduce_system(system, damping, scale)
-    rows, margins = _constraint_rows(space, point.theta)
+    rows, margins = linear_constraints(space.constraints, point.theta)
     step = bounded_step(
         reduced.hessian, reduced.gradient, space.lower - point.theta, space.upper - point.theta, rows, margins
     )
@@ -184,13 +187,6 @@ def trial_step(
     moves = reduced.node_steps(step)
     nodes = tuple(old + move for old, move in zip(point.nodes, moves, strict=True))
     return Point(theta, nodes), _predicted(system, step, moves)
-
-
-def _constraint_rows(space: ParameterSpace, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    if space.constraints is None:
-        return np.zeros((0, theta.size)), np.zeros(0)
-    margins, rows = space.constraints(theta)
-    return np.asarray(rows).reshape(-1, theta.size), np.asarray(margins).ravel()
 
 
 def _predicted(system: Linearisation, step: FloatArray, node_steps: tuple[FloatArray, ...]) -> float:

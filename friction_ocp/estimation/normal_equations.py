@@ -51,12 +51,17 @@ class NormalEquations:
         self.theta_theta += slope.T @ square[:, states:, states:].sum(axis=0) @ slope
         self.theta_gradient += slope.T @ gradient[:, states:].sum(axis=0)
 
-    def fold_node(self, j: int, slope: FloatArray) -> None:
-        """Make node j a function of the parameters with derivative `slope` (states, parameters)."""
-        cross = slope.T @ self.node_theta[j]
-        self.theta_theta += cross + cross.T + slope.T @ self.node_node[j] @ slope
-        self.theta_gradient += slope.T @ self.node_gradient[j]
-        if j < len(self.node_next):
-            self.node_theta[j + 1] += self.node_next[j].T @ slope
-            self.node_next[j] = 0.0
-        self.node_node[j], self.node_theta[j], self.node_gradient[j] = np.eye(slope.shape[0]), 0.0, 0.0
+    def fold_nodes(self, slope: FloatArray) -> None:
+        """Make the first nodes functions of the parameters with derivatives `slope` (nodes, states, parameters).
+
+        No gap joins them; the last may be joined to a node that stays.
+        """
+        count, back = len(slope), slope.transpose(0, 2, 1)
+        cross = np.sum(back @ self.node_theta[:count], axis=0)
+        self.theta_theta += cross + cross.T + np.sum(back @ self.node_node[:count] @ slope, axis=0)
+        self.theta_gradient += np.einsum("ksp,ks->p", slope, self.node_gradient[:count])
+        if count <= len(self.node_next):
+            self.node_theta[count] += self.node_next[count - 1].T @ slope[-1]
+            self.node_next[count - 1] = 0.0
+        self.node_node[:count], self.node_theta[:count] = np.eye(slope.shape[1]), 0.0
+        self.node_gradient[:count] = 0.0

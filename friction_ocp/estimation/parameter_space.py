@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -37,6 +37,10 @@ class ParameterSpace:
     """By recording: parameters -> (numbers of the drive, derivative of the active ones)."""
     constraints: ca.Function | None
     """Parameters -> (values, Jacobian) of expressions that must be >= 0."""
+    _latest: dict[str, tuple[bytes, FloatArray, FloatArray]] = field(
+        init=False, compare=False, repr=False, default_factory=dict[str, tuple[bytes, FloatArray, FloatArray]]
+    )
+    """By recording the last answer of its map: a program asks for the same one several times."""
 
     @property
     def scale(self) -> FloatArray:
@@ -47,12 +51,17 @@ class ParameterSpace:
 
     def numbers(self, theta: FloatArray, recording: str) -> FloatArray:
         """Return all numbers of the drive for a recording."""
-        return np.asarray(self.maps[recording](theta)[0]).ravel()
+        return self.numbers_and_slope(theta, recording)[0]
 
     def numbers_and_slope(self, theta: FloatArray, recording: str) -> tuple[FloatArray, FloatArray]:
-        """Return all numbers and (active, parameters) the derivative of the active ones."""
-        numbers, slope = self.maps[recording](theta)
-        return np.asarray(numbers).ravel(), np.asarray(slope)
+        """Return all numbers and (active, parameters) the derivative of the active ones; both read-only."""
+        asked, known = theta.tobytes(), self._latest.get(recording)
+        if known is None or known[0] != asked:
+            numbers, slope = (np.asarray(value) for value in self.maps[recording](theta))
+            known = self._latest[recording] = (asked, numbers.ravel(), slope)
+            for array in known[1:]:
+                array.flags.writeable = False
+        return known[1], known[2]
 
     def clip(self, theta: FloatArray) -> FloatArray:
         """Return the nearest point inside the bounds."""

@@ -8,7 +8,9 @@ recording the gaps vanish and the program is the free run.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from friction_ocp.drive.stepping import SteppedDrive
@@ -99,6 +101,11 @@ class Program:
     static: tuple[StaticTerm, ...] = ()
     """Static points: residuals of the parameters alone, always squared."""
 
+    @property
+    def without_nodes(self) -> bool:
+        """Whether no start state is a variable: each is what the measurement says."""
+        return all(cut.measured == cut.count for cut in self.segments)
+
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement."""
         pairs = zip(self.experiments, self.segments, strict=True)
@@ -115,6 +122,37 @@ class Program:
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
             return np.asarray(value).T, by_active @ slope
 
+    def measured_starts(self, theta: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Return by recording the states (measured, states) of nodes that are no variables, and their derivatives.
+
+        The derivatives are (measured, states, parameters). All recordings are computed at once.
+        """
+        states, counts = len(self.drive.state_names), [cut.measured for cut in self.segments]
+        if not any(counts):
+            nothing = np.zeros((0, states)), np.zeros((0, states, theta.size))
+            return [nothing] * len(counts)
+        pairs = [self.space.numbers_and_slope(theta, item.name) for item in self.experiments]
+        many, signals = self._starting
+        value, by_active = many(*signals, np.repeat([pair[0] for pair in pairs], counts, axis=0).T)
+        edges = np.cumsum(counts)[:-1]
+        shape = (states, sum(counts), len(self.space.active))
+        with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
+            slopes = np.split(np.asarray(by_active).reshape(shape).transpose(1, 0, 2), edges)
+            return [
+                (state, slope @ pair[1])
+                for state, slope, pair in zip(np.split(np.asarray(value).T, edges), slopes, pairs, strict=True)
+            ]
+
+    @cached_property
+    def _starting(self) -> tuple[ca.Function, tuple[FloatArray, ...]]:
+        """The start states of all measured nodes as one function, and their signals, one column a node."""
+        columns: list[list[FloatArray]] = []
+        for item, cut in zip(self.experiments, self.segments, strict=True):
+            at = cut.first[: cut.measured]
+            columns.append([signal[at] for signal in (item.smooth, item.rate, item.curvature, item.grid.at_node)])
+        signals = tuple(np.concatenate(signal).T for signal in zip(*columns, strict=True))
+        return self.sweep.start.map(sum(cut.measured for cut in self.segments)), signals
+
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""
         nodes: list[FloatArray] = []
@@ -126,27 +164,35 @@ class Program:
 
     def simulate(self, index: int, point: Point, derivatives: bool = False, with_states: bool = False) -> SweepResult:
         """Simulate the segments of one recording from their nodes."""
-        return self.sweep.run_many([self._request(index, point, derivatives, with_states)])[0]
+        start = self.measured_starts(point.theta)[index][0]
+        return self.sweep.run_many([self._request(index, point, start, derivatives, with_states)])[0]
 
     def simulate_all(self, point: Point, derivatives: bool = False) -> list[SweepResult]:
         """Simulate all recordings, side by side."""
-        return self.sweep.run_many([self._request(k, point, derivatives) for k in range(len(self.experiments))])
+        starts = self.measured_starts(point.theta)
+        return self.sweep.run_many([self._request(k, point, start, derivatives) for k, (start, _) in enumerate(starts)])
 
-    def _scored(self, point: Point, derivatives: bool = False) -> list[tuple[SweepResult, Score]]:
+    def _scored(
+        self, point: Point, starts: list[tuple[FloatArray, FloatArray]], derivatives: bool = False
+    ) -> list[tuple[SweepResult, Score]]:
         """Simulate all recordings, comparing with their measurements on the way."""
         requests = [
-            replace(self._request(k, point, derivatives), yardstick=Yardstick(item.measured, self.noise, self.loss))
-            for k, item in enumerate(self.experiments)
+            replace(
+                self._request(k, point, start, derivatives),
+                yardstick=Yardstick(self.experiments[k].measured, self.noise, self.loss),
+            )
+            for k, (start, _) in enumerate(starts)
         ]
         results = self.sweep.run_many(requests)
         return [(result, result.score) for result in results if result.score is not None]
 
-    def _request(self, index: int, point: Point, derivatives: bool, with_states: bool = False) -> SweepRequest:
+    def _request(
+        self, index: int, point: Point, start: FloatArray, derivatives: bool, with_states: bool = False
+    ) -> SweepRequest:
         item, cut = self.experiments[index], self.segments[index]
         nodes = point.nodes[index]
         if cut.measured:
-            nodes = nodes.copy()
-            nodes[: cut.measured] = self.measured_states(item, point.theta, cut.first[: cut.measured])[0]
+            nodes = np.concatenate([start, nodes[cut.measured :]])
         numbers = self.space.numbers(point.theta, item.name)
         return SweepRequest(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
 
@@ -157,7 +203,7 @@ class Program:
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
         total = _prior_cost(self.space, point.theta) + self._static_cost(point.theta)
-        for index, (result, score) in enumerate(self._scored(point)):
+        for index, (result, score) in enumerate(self._scored(point, self.measured_starts(point.theta))):
             total += float(np.sum(score.cost)) + self._start_cost(index, point)
             total += self._gap_cost(self.segments[index], point.nodes[index], result.end)
         return total if np.isfinite(total) else np.inf
@@ -179,23 +225,26 @@ class Program:
         suggested, _ = self.measured_states(self.experiments[index], point.theta, cut.first[tied])
         return 0.5 * float(np.sum((cut.start_weight[tied] * (point.nodes[index][tied] - suggested)) ** 2))
 
-    def linearise(self, point: Point) -> Linearisation:
-        """Return objective, gradient and Gauss-Newton Hessian at a point."""
-        count = point.theta.size
-        hessian, gradient = np.zeros((count, count)), np.zeros(count)
-        total = _prior_cost(self.space, point.theta)
-        pull = np.where(np.isfinite(self.space.prior_std), self.space.prior_std, 1.0) ** -2.0
-        pull = np.where(np.isfinite(self.space.prior_std), pull, 0.0)
-        hessian += np.diag(pull)
-        gradient += pull * (point.theta - self.space.prior_mean)
+    def parameter_terms(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return cost, Hessian and gradient of what hangs on the parameters alone: priors and static points."""
+        stated = np.isfinite(self.space.prior_std)
+        pull = np.where(stated, np.where(stated, self.space.prior_std, 1.0) ** -2.0, 0.0)
+        total = _prior_cost(self.space, theta)
+        hessian, gradient = np.diag(pull), pull * (theta - self.space.prior_mean)
         for term in self.static:
-            errors, slope = term.residuals(self.space, point.theta)
+            errors, slope = term.residuals(self.space, theta)
             total += 0.5 * float(errors @ errors)
             hessian += slope.T @ slope
             gradient += slope.T @ errors
+        return total, hessian, gradient
+
+    def linearise(self, point: Point) -> Linearisation:
+        """Return objective, gradient and Gauss-Newton Hessian at a point."""
+        total, hessian, gradient = self.parameter_terms(point.theta)
         blocks: list[Blocks] = []
-        for index, (result, score) in enumerate(self._scored(point, derivatives=True)):
-            cost, by_theta, slope, block = self._linearise_recording(index, point, result, score)
+        starts = self.measured_starts(point.theta)
+        for index, (result, score) in enumerate(self._scored(point, starts, derivatives=True)):
+            cost, by_theta, slope, block = self._linearise_recording(index, point, (result, score), starts[index][1])
             total += cost
             hessian += by_theta
             gradient += slope
@@ -203,9 +252,9 @@ class Program:
         return Linearisation(total if np.isfinite(total) else np.inf, hessian, gradient, tuple(blocks))
 
     def _linearise_recording(
-        self, index: int, point: Point, result: SweepResult, score: Score
+        self, index: int, point: Point, scored: tuple[SweepResult, Score], start_slope: FloatArray
     ) -> tuple[float, FloatArray, FloatArray, Blocks]:
-        cut, nodes = self.segments[index], point.nodes[index]
+        (result, score), cut, nodes = scored, self.segments[index], point.nodes[index]
         assert score.gradient is not None and score.square is not None
         _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
         states, count = nodes.shape[1], point.theta.size
@@ -213,7 +262,7 @@ class Program:
         system.cost += float(np.sum(score.cost))
         system.add_squares(slice(0, cut.count), score.square, score.gradient, slope)
         self._add_gaps(cut, nodes, result, slope, system)
-        self._add_start(index, point, system)
+        self._add_start(index, point, start_slope, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
@@ -235,12 +284,10 @@ class Program:
         system.node_theta[after] -= back @ (jacobian[:, :, states:] @ slope)
         system.node_gradient[after] -= np.einsum("kij,kj->ki", back, gap)
 
-    def _add_start(self, index: int, point: Point, system: NormalEquations) -> None:
+    def _add_start(self, index: int, point: Point, start_slope: FloatArray, system: NormalEquations) -> None:
         cut, item = self.segments[index], self.experiments[index]
         if cut.measured:
-            _, slopes = self.measured_states(item, point.theta, cut.first[: cut.measured])
-            for j, slope in enumerate(slopes):
-                system.fold_node(j, slope)
+            system.fold_nodes(start_slope)
         elif cut.start_weight is not None:
             suggested, slopes = self.measured_states(item, point.theta, cut.first[cut.tied])
             for j, expected, slope in zip(cut.tied, suggested, slopes, strict=True):

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from friction_ocp.simulation.grid import FloatArray
+
+
+def linear_constraints(constraints: ca.Function | None, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A (constraints, parameters) and b: margins are b + A d to first order, and may not turn negative."""
+    if constraints is None:
+        return np.zeros((0, theta.size)), np.zeros(0)
+    margins, rows = constraints(theta)
+    return np.asarray(rows).reshape(-1, theta.size), np.asarray(margins).ravel()
 
 
 def bounded_step(

@@ -15,7 +15,16 @@ from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.release import released
-from friction_ocp.estimation.stages import WIDTHS, free_run, loss_of_round, mean_error, predictions, relaxed, rounds_of
+from friction_ocp.estimation.stages import (
+    WIDTHS,
+    free_run,
+    loss_of_round,
+    mean_error,
+    predictions,
+    relaxed,
+    roundings_of,
+)
+from friction_ocp.estimation.structured import solve_structured
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
@@ -66,7 +75,7 @@ def program_builder(model: Model) -> Builder:
 def final_solver(model: Model) -> Solve:
     """Return what solves the programs of a fit: the structured solver, or Ipopt where the problem asks for it."""
     if model.problem.estimation.solver == "gauss_newton":
-        return solve_gauss_newton
+        return solve_structured
     from friction_ocp.estimation.ipopt import solve_ipopt
 
     return solve_ipopt
@@ -127,19 +136,25 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
     points.sort(key=lambda point: mean_error(program, point))
-    rounds = rounds_of(model, len(plan.widths))
+    rounds = max(len(plan.widths), len(roundings_of(model, program)))
     iterations, ends = 0, list[Solution]()
     for k in range(rounds):
         program = plan.builder(model, plan.widths[min(k, len(plan.widths) - 1)], Squares())
         program = replace(program, loss=loss_of_round(model, program, points[0], k))
         watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
         last = k == rounds - 1
-        ends = race(program, points, limits(model) if last else COARSE, watch, final_solver(model))
+        ends = race(program, points, limits(model) if last else COARSE, watch, _solver_of_round(model, k))
         if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
         iterations += sum(end.iterations for end in ends)
     return [Fitted(replace(end, iterations=iterations), program) for end in ends]
+
+
+def _solver_of_round(model: Model, number: int) -> Solve:
+    """Return what solves a round: reweighting in the first, where even the absolute loss is nearly squares."""
+    solve = final_solver(model)
+    return solve_gauss_newton if number == 0 and solve is solve_structured else solve
 
 
 def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve) -> list[Solution]:

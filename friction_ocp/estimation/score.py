@@ -72,7 +72,7 @@ def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Progra
 
 def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
     """Solve for the node states with the parameters held."""
-    if all(cut.count == cut.measured for cut in program.segments):
+    if program.without_nodes:
         return point
     still = np.zeros_like(point.theta)
     objective, damping = program.objective(point), 1e-6

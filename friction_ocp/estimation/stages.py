@@ -17,6 +17,8 @@ from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Square
 PREDICTION_SAMPLES = 20
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)
 """Rounding of the absolute loss over the mean error, stage by stage."""
+FEW_ROUNDINGS = (1.0, 0.05, 0.0004)
+"""The same for a solver that keeps the loss and linearises the residuals alone."""
 WIDTHS = (0.1, 0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the
 first: there a wide smoothing only invents slopes and breaks at low speed."""
@@ -126,9 +128,12 @@ def mean_error(program: Program, point: Point) -> float:
     return float(np.mean(np.concatenate(sizes)))
 
 
-def rounds_of(model: Model, widths: int) -> int:
-    """Return how many rounds a fit takes: the absolute loss needs its own number of roundings."""
-    return max(widths, len(ROUNDINGS)) if model.problem.estimation.loss == "absolute" else widths
+def roundings_of(model: Model, program: Program) -> tuple[float, ...]:
+    """Return the roundings that a fit by the absolute loss goes through; none for another loss."""
+    if model.problem.estimation.loss != "absolute":
+        return ()
+    few = model.problem.estimation.solver == "gauss_newton" and program.without_nodes
+    return FEW_ROUNDINGS if few else ROUNDINGS
 
 
 def loss_of_round(model: Model, program: Program, best: Point, number: int) -> AbstractLoss:
@@ -141,4 +146,5 @@ def loss_of_round(model: Model, program: Program, best: Point, number: int) -> A
         case "student_t":
             return StudentT()
         case "absolute":
-            return Absolute(ROUNDINGS[min(number, len(ROUNDINGS) - 1)] * mean_error(program, best))
+            roundings = roundings_of(model, program)
+            return Absolute(roundings[min(number, len(roundings) - 1)] * mean_error(program, best))

@@ -67,13 +67,14 @@ class Absolute(AbstractLoss):
         return self.rounding
 
     def cost(self, residual: FloatArray) -> FloatArray:
-        return np.sqrt(residual**2 + self.rounding**2) - self.rounding
+        return np.sqrt(residual * residual + self.rounding**2) - self.rounding
 
     def weight(self, residual: FloatArray) -> FloatArray:
-        return 1.0 / np.sqrt(residual**2 + self.rounding**2)
+        return 1.0 / np.sqrt(residual * residual + self.rounding**2)
 
     def curvature(self, residual: FloatArray) -> FloatArray:
-        return self.rounding**2 / (residual**2 + self.rounding**2) ** 1.5
+        squared = residual * residual + self.rounding**2
+        return self.rounding**2 / (squared * np.sqrt(squared))
 
 
 @dataclass(frozen=True)
