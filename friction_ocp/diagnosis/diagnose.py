@@ -259,6 +259,11 @@ def _options(problem: Problem) -> tuple[float, list[str]]:
     return float(level), [str(name) for name in wanted if name not in left_out]
 
 
+def _gain(current: FittedModel, rival: Rival) -> float:
+    """Return what a rival gains for certain: held out, but no more than where it was fitted."""
+    return min(float(np.sum(rival.gains)), current.objective - rival.fitted.objective)
+
+
 def _required(base: FittedModel, current: FittedModel) -> float:
     """Return the decrease of the objective that makes an addition an effect of its own."""
     whole, rest = (max(item.objective - 0.5 * samples(item), 0.0) for item in (base, current))
@@ -280,7 +285,7 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     shortlist = _shortlist(hopeful, PLAUSIBLE if power.significant(level) else level / max(len(found), 1))
     choice = choose(_rivals(crew, shortlist), blocks, level, rng)
     best = choice.rivals[0] if choice.significant else None
-    if best is not None and (float(np.sum(best.gains)) < required or not _is_material(current, best.fitted)):
+    if best is not None and (_gain(current, best) < required or not _is_material(current, best.fitted)):
         best = None
     return Round(tuple(found), choice, current, power, best)
 

@@ -1,7 +1,13 @@
-"""Is there a slow torque that the model lacks, of whatever shape: a test over stretches of time."""
+"""Is there a slow torque or a slow error of a channel that the model lacks, of whatever shape, and where.
+
+Each place is given a constant of its own over every stretch of time: a torque on a shaft, an internal torque in an
+elastic transmission (a twist), an error of a channel. What the constants of a place explain is compared with what noise
+makes of them, and with that of the other places.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,17 +16,33 @@ from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.effects.effect import Clues
-from friction_ocp.effects.torques import ConstantTorqueEffect
+from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, KinematicError, Shaft
+from friction_ocp.effects.effect import (
+    Clues,
+    change_channel,
+    change_shaft,
+    change_transmission,
+    either_way,
+    moving_shafts,
+)
+from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
 STRETCHES = 24
-"""In each recording, a constant torque in each."""
+"""In each recording, a constant in each."""
+SHARE = 0.05
+"""Size of a constant, over what is typical there, at which it is simulated: small enough to be linear."""
+FAR = 1e9
+"""Period of a wave that is a constant wherever a drive goes, rad."""
+TOLD = 1e-10
+"""Power of a combination of constants over the largest one below which it is rounding."""
+DEVIATIONS = 10.0
+"""Size of a channel's constant over its noise floor at which it is simulated."""
 
 
 @dataclass(frozen=True)
 class SlowTorque:
-    """What a torque that is constant over stretches of time would explain on one shaft."""
+    """What a torque, or an error, that is constant over stretches of time would explain at one place."""
 
     component: str
     ratio: float
@@ -29,20 +51,61 @@ class SlowTorque:
     """Of a ratio this large under noise, the floors being off by their doubt."""
 
 
+@dataclass(frozen=True)
+class Probe:
+    """A drive with a constant at one place, and the values at which it is simulated."""
+
+    component: str
+    drive: Drive
+    values: Mapping[str, float]
+
+
 def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
-    """Test every shaft on which a constant torque can be put; free runs, whose errors add up, are left out."""
+    """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
     if fitted.footing.segment_s is None:
         return ()
-    effect, drive = ConstantTorqueEffect(), fitted.model.problem.drive
-    return tuple(_slow_torque(fitted, clues, effect, place) for place in effect.places(drive))
+    return tuple(_slow_torque(fitted, probe) for probe in probes(fitted, clues))
 
 
-def _slow_torque(fitted: FittedModel, clues: Clues, effect: ConstantTorqueEffect, place: str) -> SlowTorque:
-    augmentation = effect.augment(fitted.model.problem.drive, place, clues)
-    built = contrast(fitted.model, fitted.linear, augmentation.drive)
-    (amplitude,) = augmentation.trials[0].amplitudes
+def probes(fitted: FittedModel, clues: Clues) -> Iterator[Probe]:
+    """Yield the places that compete."""
+    drive = fitted.model.problem.drive
+    for shaft in moving_shafts(drive):
+        path, size = f"{shaft.name}.external_torque.constant", SHARE * clues.typical_torque[shaft.name]
+        added = change_shaft(drive, shaft.name, external_torque=ExternalTorque(either_way(size)))
+        yield Probe(shaft.name, added, {path: _constant(fitted, shaft) + size})
+    for item in drive.transmissions:
+        if not item.rigid and item.kinematic_error is None:
+            stiffness = max(clues.numbers[f"{item.name}.stiffness"], 1e-300)
+            size = SHARE * clues.typical_torque[item.to_shaft] / stiffness
+            wave = KinematicError(either_way(size), 0.0, FAR)
+            added = change_transmission(drive, item.name, kinematic_error=wave)
+            yield Probe(item.name, added, {f"{item.name}.kinematic_error.cosine": size})
+    for k, channel in enumerate(drive.outputs):
+        size = DEVIATIONS * float(fitted.model.noise[k])
+        added = change_channel(drive, channel.name, offset=either_way(size))
+        yield Probe(channel.name, added, {f"{channel.name}.offset": _offset(fitted, channel) + size})
+
+
+def _constant(fitted: FittedModel, shaft: Shaft) -> float:
+    """Return the constant torque that the model has on a shaft."""
+    known = 0.0 if shaft.external_torque is None else shaft.external_torque.constant
+    return _number(fitted, f"{shaft.name}.external_torque.constant", known)
+
+
+def _offset(fitted: FittedModel, channel: Channel) -> float:
+    return _number(fitted, f"{channel.name}.offset", channel.offset)
+
+
+def _number(fitted: FittedModel, path: str, stated: object) -> float:
+    guess = stated.guess if isinstance(stated, Free) else stated
+    return fitted.values.get(path, float(guess) if isinstance(guess, (int, float)) else 0.0)
+
+
+def _slow_torque(fitted: FittedModel, probe: Probe) -> SlowTorque:
+    built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
-    theta, columns, begin = built.theta(amplitude), list[FloatArray](), 0
+    theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0
     for index, item in enumerate(fitted.linear.recordings):
         y, end, _ = built.simulate(index, item, theta)
         stretch = (np.arange(item.cut.count) * STRETCHES) // item.cut.count
@@ -54,17 +117,18 @@ def _slow_torque(fitted: FittedModel, clues: Clues, effect: ConstantTorqueEffect
         whole[begin : begin + own.shape[0]] = own
         columns.append(whole)
         begin += own.shape[0]
-    return _tested(place, fitted, rows.absorbed(np.concatenate(columns, axis=1)))
+    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)))
 
 
 def _tested(place: str, fitted: FittedModel, columns: FloatArray) -> SlowTorque:
     """Test amplitudes by the share of squares that they take, each counted once (F test over all samples)."""
     rows = fitted.linear.rows
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    told = sizes > 1e-6 * max(float(sizes[0]), 1e-300)
+    powers, axes = np.linalg.eigh(columns.T @ columns)
+    told = powers > TOLD * max(float(powers[-1]), 1e-300)
     freedom = int(np.sum(told))
     if freedom == 0:
         return SlowTorque(place, 1.0, 1.0)
-    ratio = float(np.mean((left[:, told].T @ rows.residual) ** 2))
+    amplitudes = axes[:, told].T @ (columns.T @ rows.residual) / np.sqrt(powers[told])
+    ratio = float(np.mean(amplitudes**2))
     limit = (1.0 + FLOOR_DOUBT) ** 2
     return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / limit, freedom)))

@@ -15,8 +15,10 @@ from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 STEPS = 15
 """Of the nodes of a recording from a start at rest."""
-CLEAR = 4.0 * np.sqrt(6.0)
-"""Jump over the noise of a channel that noise alone does not make: four deviations of a second difference."""
+CLEAR = 5.0 * np.sqrt(5.0)
+"""Step beyond those beside it, over the noise of a channel, that noise alone does not make: five deviations."""
+RARE = 0.05
+"""Share of samples beside jumps."""
 
 
 def settled(program: Program, point: Point) -> Point:
@@ -71,11 +73,15 @@ def without_jumps(item: Experiment, outputs: Sequence[Channel], noise: FloatArra
 
 
 def beside_jumps(values: FloatArray, noise: float) -> BoolArray:
-    """Return (n,) whether a sample lies next to a step that its neighbours, both together, do not come up to."""
-    step = np.abs(np.diff(values))
-    around = np.pad(step, 1)
-    jump = step > around[:-2] + around[2:] + CLEAR * noise
+    """Return (n,) whether a sample lies next to a step that its neighbours do not lead up to.
+
+    Where such steps are common they are no jumps but a vibration, and none is returned.
+    """
     found = np.zeros(values.size, dtype=bool)
-    found[:-1] |= jump
-    found[1:] |= jump
-    return found
+    step = np.diff(values)
+    if step.size < 3:
+        return found
+    jump = np.abs(step[1:-1] - 0.5 * (step[:-2] + step[2:])) > CLEAR * noise
+    found[1:-2] |= jump
+    found[2:-1] |= jump
+    return found if np.mean(found) < RARE else np.zeros_like(found)
