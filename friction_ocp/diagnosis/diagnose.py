@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_additi
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.reading import other_reading
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown
+from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown, with_refused
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.drive.parts import Drive
@@ -283,11 +283,12 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     power = excess(current.linear.rows, blocks)
     hopeful = [item for item in found if item.gain >= HOPE * required]
     shortlist = _shortlist(hopeful, PLAUSIBLE if power.significant(level) else level / max(len(found), 1))
-    choice = choose(_rivals(crew, shortlist), blocks, level, rng)
+    rivals = _rivals(crew, shortlist)
+    able = [_gain(current, item) >= required and _is_material(current, item.fitted) for item in rivals]
+    choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
     best = choice.rivals[0] if choice.significant else None
-    if best is not None and (_gain(current, best) < required or not _is_material(current, best.fitted)):
-        best = None
-    return Round(tuple(found), choice, current, power, best)
+    refused = tuple(item for item, yes in zip(rivals, able, strict=True) if not yes)
+    return Round(tuple(found), with_refused(choice, refused), current, power, best)
 
 
 def _shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class Choice:
     """What the held-out gains say about the rivals, best first."""
 
     rivals: tuple[Rival, ...]
+    """Last those that explain too little to take part."""
     probabilities: tuple[float, ...]
     """Of each rival to be the best."""
     nothing: float
@@ -101,6 +102,13 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
         significant=alone or (some and len(aliases) > 1),
         aliases=tuple(aliases),
         same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
+    )
+
+
+def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:
+    """Return a choice with rivals that were refitted and take no part, their probability 0."""
+    return replace(
+        choice, rivals=(*choice.rivals, *refused), probabilities=(*choice.probabilities, *(0.0 for _ in refused))
     )
 
 

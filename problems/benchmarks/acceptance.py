@@ -13,6 +13,7 @@ import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import diagnosis
 import engine
 import servo
 import users
@@ -25,6 +26,7 @@ MEASURES: Mapping[str, Mapping[str, Measure]] = {
     "servo": servo.MEASURES,
     "engine": engine.MEASURES,
     "users": users.MEASURES,
+    "diagnosis": diagnosis.MEASURES,
 }
 """By piece of work and ID: (line, quick) -> check."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from pathlib import Path
 
 import acceptance
+import diagnosis
 import pytest
 import servo
 from checks import Check, status
@@ -35,7 +37,24 @@ def test_what_is_measured_are_lines(name: str) -> None:
     assert acceptance.MEASURES[name].keys() < acceptance.lines()[name].keys()
 
 
-@pytest.mark.parametrize("name", ["telescopes", "diagnosis"])
+def test_every_line_of_the_diagnosis_has_its_measurement() -> None:
+    """IDs of lines and measurements are the same."""
+    assert list(acceptance.lines()["diagnosis"]) == list(diagnosis.MEASURES)
+
+
+def test_a_score_of_few_cases_is_no_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blind suite's line shows what was scored, and holds only with a report of enough cases."""
+    lines = [{"what": "cause right", "measured": "9 of 10", "passed": True}]
+    for title, counts, held in (("seed 5 (development)", (100, 60), False), ("seed 20261121 (report)", (99, 60), False),
+                                ("seed 20261121 (report)", (100, 60), True)):  # fmt: skip
+        cases = [{"kind": kind} for kind, count in zip(("one", "none"), counts, strict=True) for _ in range(count)]
+        (tmp_path / "score.json").write_text(json.dumps({"title": title, "lines": lines, "cases": cases}))
+        monkeypatch.setenv(diagnosis.BLIND, str(tmp_path))
+        check = diagnosis.blind_suite("line", quick=False)
+        assert check.passed is held and "cause right: 9 of 10" in check.measured
+
+
+@pytest.mark.parametrize("name", ["telescopes"])
 def test_lines_without_measurement_fail(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Every line is printed as not measured, and the exit status is 1."""
     assert acceptance.main([name]) == 1

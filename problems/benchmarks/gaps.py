@@ -1,0 +1,322 @@
+"""Drives with a gap, made by the plant of the tests or converted, and what `diagnose` says of them."""
+
+from __future__ import annotations
+
+import copy
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import yaml
+
+from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.recording import Channel, Recording
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+import aries  # noqa: E402
+import leighton  # noqa: E402
+from plant import (  # noqa: E402
+    Plant,
+    PlantController,
+    PlantFriction,
+    PlantMotor,
+    PlantSensor,
+    PlantShaft,
+    PlantTransmission,
+    Trajectory,
+    steps_and_multisine,
+)
+
+Document = dict[str, Any]
+STEP = 1e-3
+RUNS = ("a", "b", "c")
+"""Two to fit and one to check."""
+ODRIVE = "FRICTION_OCP_ODRIVE"
+COUNTS = 8192.0
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a diagnosis says of a case."""
+
+    case: str
+    found: Diagnosis
+
+    @property
+    def sets(self) -> list[frozenset[tuple[str, str]]]:
+        """What could be meant, in the order of the answer: each accepted effect with its alias set."""
+        sets = [frozenset(keys) for keys in self.found.alias_sets]
+        return [next((one for one in sets if key in one), frozenset([key])) for key in self.found.accepted]
+
+    def names(self, effect: str, component: str) -> bool:
+        """Whether an effect at a component is what was found first, by itself or with one alias."""
+        return bool(self.sets) and (effect, component) in self.sets[0] and len(self.sets[0]) <= 2
+
+    @property
+    def told(self) -> str:
+        """One line."""
+        named = [" or ".join(f"{effect} at {place}" for effect, place in sorted(one)) for one in self.sets]
+        return f"{self.case}: {self.found.verdict}; {', '.join(named) or 'nothing added'}"
+
+
+def diagnosed(case: str, path: Path) -> Named:
+    """Diagnose a problem file in this process."""
+    return Named(case, diagnose(load_problem(path)))
+
+
+def guessed(value: float) -> Document:
+    """Return a parameter whose guess is 4 % off."""
+    return {"guess": 1.04 * value, "min": 0.01 * value, "max": 100.0 * value}
+
+
+def write(folder: Path, document: Document, recordings: Mapping[str, Recording], check: Sequence[str]) -> Path:
+    """Write a problem and its recordings."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, recording in recordings.items():
+        write_recording(recording, folder / f"{name}.h5")
+    train = [f"{name}.h5" for name in recordings if name not in check]
+    full = {
+        "format": "friction-ocp-problem/1",
+        **copy.deepcopy(document),
+        "recordings": {"train": train, "validation": [f"{name}.h5" for name in check]},
+    }
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(full, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def recorded(plant: Plant, name: str, channels: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Recording:
+    """Return what the sensors of a plant saw, in SI units."""
+    units = {"theta": "rad", "omega": "rad/s", "alpha": "rad/s^2", "current": "A", "torque": "N m"}
+    kinds = {item.name: units[item.measures.partition(".")[2]] for item in plant.sensors}
+    seen = {key: Channel(key, *channels[key], kinds[key]) for key in kinds if not key.startswith("loop")}
+    return Recording(name, seen)
+
+
+def driven(plant: Plant, seconds: float, levels: np.ndarray, amplitude: float, seed: int) -> Mapping[str, Any]:
+    """Run a plant on reversing steps of current with a multisine."""
+    rng = np.random.default_rng(seed)
+    steps = steps_and_multisine(levels, (0.2, 0.6), amplitude, (0.5, 20.0), seconds, rng)
+    time = np.arange(0.0, seconds, STEP)
+    current = Trajectory(time, np.interp(time, np.asarray(steps.time), np.asarray(steps.value)), "zero")
+    return plant.simulate(seconds, {"motor.current": current}, rng).channels
+
+
+LTO_SECONDS, LTO_DAMPING = 8.0, 2.0e5
+LTO_FAST, LTO_SLOW = (0.11, 0.0003), (0.0347, 0.0003)
+"""Coulomb and viscous friction of both sides at the motor, N m and N m s/rad."""
+
+
+def lto(kind: str, folder: Path) -> Path:
+    """Write one chain of the Leighton telescope under a speed loop, its model with straight friction lines."""
+    fast = {"fast": leighton.fast_polyline(), "quadratic": leighton.fast_quadratic()}.get(kind, leighton.fast_linear())
+    slow = leighton.slow_polyline() if kind == "slow" else leighton.slow_friction()
+    plain = leighton.lumped(fast, slow, LTO_DAMPING)
+    loop = PlantController(
+        "loop", "pi_velocity", "loop_encoder", kp=0.14, ki=0.7, sample_time=STEP, saturation=(-25.0, 25.0)
+    )
+    motor = PlantMotor("motor", "motor", "current", leighton.TORQUE_CONSTANT, controller="loop")
+    sensors = (
+        PlantSensor("motor_position", "motor.theta", STEP, resolution=2.0 * np.pi / 2**14),
+        PlantSensor("load_position", "load.theta", STEP, resolution=2.0 * np.pi / 2**26),
+        PlantSensor("current", "motor.current", STEP, noise_std=0.005),
+        PlantSensor("loop_encoder", "motor.theta", STEP, resolution=2.0 * np.pi / 2**20),
+    )
+    plant = Plant(plain.shafts, plain.transmissions, (motor,), (loop,), sensors)
+    runs = {name: recorded(plant, name, _slewed(plant, k + 1)) for k, name in enumerate(RUNS)}
+    return write(folder, _lto_model(), runs, RUNS[2:])
+
+
+def _slewed(plant: Plant, seed: int) -> Mapping[str, Any]:
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, LTO_SECONDS, 0.8)
+    speed = leighton.SLEW * rng.uniform(0.15, 1.0, time.size) * np.where(np.arange(time.size) % 2, -1.0, 1.0)
+    wanted = Trajectory(time, np.where(time > 0, speed, 0.0), "linear")
+    return plant.simulate(LTO_SECONDS, {"reference.omega": wanted}, rng).channels
+
+
+def _lto_model() -> Document:
+    fast = {"law": "coulomb_viscous", "tau_c": guessed(LTO_FAST[0]), "viscous": guessed(LTO_FAST[1])}
+    ratio = leighton.RATIO
+    slow = {
+        "law": "coulomb_viscous",
+        "tau_c": guessed(ratio * LTO_SLOW[0]),
+        "viscous": guessed(ratio**2 * LTO_SLOW[1]),
+    }
+    return {
+        "drive": {
+            "motor": {"name": "motor", "torque_constant": leighton.TORQUE_CONSTANT},
+            "shafts": [
+                {"name": "motor", "inertia": leighton.MOTOR_INERTIA, "friction": fast},
+                {"name": "load", "inertia": 0.5 * leighton.LOAD_INERTIA, "friction": slow},
+            ],
+            "transmissions": [
+                {"ratio": ratio, "stiffness": guessed(leighton.STIFFNESS), "damping": guessed(LTO_DAMPING)}
+            ],
+        },
+        "channels": {
+            "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": 0.005},
+            "motor_position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / 2**14},
+            "load_position": {"measures": "load.theta", "resolution": 2.0 * np.pi / 2**26},
+        },
+        "estimation": {"fit": "simulation"},
+    }
+
+
+def aries_axis(left_out: str, folder: Path) -> Path:
+    """Write the ARIES axis under its loop, its model without one of Stribeck friction, presliding and asymmetry."""
+    one_way = {key: value[0] for key, value in aries.NUMBERS.items()}
+    numbers = dict(aries.NUMBERS) if left_out == "asymmetry" else one_way
+    law = {"stribeck": "lugre", "presliding": "lugre", "asymmetry": "lugre"}[left_out]
+    plain = aries.axis(STEP)
+    shaft = PlantShaft("axis", aries.INERTIA, PlantFriction(law, delta=aries.DELTA, **numbers))
+    plant = Plant((shaft,), (), plain.motors, plain.controllers, plain.sensors)
+    runs: dict[str, Recording] = {}
+    for k, name in enumerate(RUNS):
+        rng = np.random.default_rng(k + 1)
+        time = np.arange(0.0, 12.0, 1.5)
+        sizes = np.exp(rng.uniform(np.log(1.5e-3), np.log(4e-2), time.size))
+        speed = np.where(time > 0, sizes * np.where(np.arange(time.size) % 2, -1.0, 1.0), 0.0)
+        done = plant.simulate(12.0, {"reference.omega": Trajectory(time, speed, "linear")}, rng, step=aries.PLANT_STEP)
+        seen = {key: Channel(key, *done.channels[key], unit) for key, unit in (("position", "rad"), ("torque", "N m"))}
+        runs[name] = Recording(name, seen)
+    return write(folder, _aries_model(left_out, one_way), runs, RUNS[2:])
+
+
+def _aries_model(left_out: str, numbers: Mapping[str, float]) -> Document:
+    law: Document = {"law": "lugre", "delta": aries.DELTA, "sigma2": guessed(numbers["viscous"])}
+    law |= {key: guessed(numbers[key]) for key in ("tau_c", "tau_s", "omega_s", "sigma0", "sigma1")}
+    if left_out == "presliding":
+        law = {key: value for key, value in law.items() if not key.startswith("sigma")}
+        law |= {"law": "stribeck", "viscous": guessed(numbers["viscous"])}
+    if left_out == "stribeck":
+        law = {"law": "dahl", "sigma0": guessed(numbers["sigma0"]), "sigma1": guessed(numbers["sigma1"])}
+        law |= {"tau_c": guessed(numbers["tau_c"]), "sigma2": guessed(numbers["viscous"])}
+    return {
+        "drive": {
+            "motor": {"name": "motor", "torque_constant": 1},
+            "shafts": [{"name": "axis", "inertia": guessed(aries.INERTIA), "friction": law}],
+        },
+        "channels": {
+            "torque": {"measures": "motor.torque", "role": "input", "hold": "zero", "noise_std": aries.TORQUE_NOISE},
+            "position": {"measures": "axis.theta", "noise_std": aries.LOG_NOISE},
+        },
+    }
+
+
+GEAR = 50.0
+
+
+def harmonic_drive(folder: Path) -> Path:
+    """Write a joint on a compliant reducer, its model rigid with a delay of the joint encoder that is free."""
+    friction = (
+        PlantFriction("coulomb_viscous", tau_c=0.02, viscous=5e-5),
+        PlantFriction("coulomb_viscous", tau_c=0.8, viscous=0.6),
+    )
+    plant = Plant(
+        shafts=(PlantShaft("motor", 1e-4, friction[0]), PlantShaft("joint", 0.4, friction[1])),
+        transmissions=(PlantTransmission("motor", "joint", GEAR, 800.0, 1.5),),
+        motors=(PlantMotor("motor", "motor", torque_constant=0.05),),
+        sensors=(
+            PlantSensor("motor_position", "motor.theta", STEP, resolution=2.0 * np.pi / 2**14),
+            PlantSensor("joint_position", "joint.theta", STEP, resolution=2.0 * np.pi / 2**18),
+            PlantSensor("current", "motor.current", STEP, noise_std=0.005),
+        ),
+    )
+    levels = np.array([0.8, 1.5, 2.5])
+    runs = {n: recorded(plant, n, driven(plant, 4.0, levels, 0.5, k + 1)) for k, n in enumerate(RUNS)}
+    fast = {"law": "coulomb_viscous", "tau_c": guessed(0.02), "viscous": guessed(5e-5)}
+    slow = {"law": "coulomb_viscous", "tau_c": guessed(0.8), "viscous": guessed(0.6)}
+    late = {"guess": 0.0, "min": 0, "max": 0.05}
+    document = {
+        "drive": {
+            "motor": {"name": "motor", "torque_constant": 0.05},
+            "shafts": [
+                {"name": "motor", "inertia": 1e-4, "friction": fast},
+                {"name": "joint", "inertia": guessed(0.4), "friction": slow},
+            ],
+            "transmissions": [{"ratio": GEAR, "stiffness": "rigid"}],
+        },
+        "channels": {
+            "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": 0.005},
+            "motor_position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / 2**14},
+            "joint_position": {"measures": "joint.theta", "resolution": 2.0 * np.pi / 2**18, "delay": late},
+        },
+    }
+    return write(folder, document, runs, RUNS[2:])
+
+
+def slow_motion(folder: Path, seed: int) -> Path:
+    """Write an axis with Coulomb and viscous friction that creeps and reverses, its model the same."""
+    friction = PlantFriction("coulomb_viscous", tau_c=0.1, viscous=1.5e-3)
+    plant = Plant(
+        shafts=(PlantShaft("motor", 0.002, friction),),
+        motors=(PlantMotor("motor", "motor", "current", 0.35, controller="loop"),),
+        controllers=(PlantController("loop", "pi_velocity", "loop_encoder", kp=0.5, ki=5.0, sample_time=STEP),),
+        sensors=(
+            PlantSensor("position", "motor.theta", STEP, resolution=2.0 * np.pi / 2**14),
+            PlantSensor("current", "motor.current", STEP, noise_std=0.005),
+            PlantSensor("loop_encoder", "motor.theta", STEP, resolution=2.0 * np.pi / 2**20),
+        ),
+    )
+    runs: dict[str, Recording] = {}
+    for k, name in enumerate(RUNS):
+        rng = np.random.default_rng([seed, k])
+        time = np.arange(0.0, 6.0, 0.5)
+        speed = rng.uniform(0.2, 3.0, time.size) * rng.choice([-1.0, 1.0], time.size)
+        wanted = Trajectory(time, np.where(time > 0, speed, 0.0), "linear")
+        runs[name] = recorded(plant, name, plant.simulate(6.0, {"reference.omega": wanted}, rng).channels)
+    law = {"law": "coulomb_viscous", "tau_c": guessed(0.1), "viscous": guessed(1.5e-3)}
+    document = {
+        "drive": {
+            "motor": {"name": "motor", "torque_constant": 0.35},
+            "shafts": [{"name": "motor", "inertia": guessed(0.002), "friction": law}],
+        },
+        "channels": {
+            "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": 0.005},
+            "position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / 2**14},
+        },
+    }
+    return write(folder, document, runs, RUNS[2:])
+
+
+def odrive(kind: str, folder: Path) -> Path | None:
+    """Write the slow turns of a motor with (`comp`) or without (`nocomp`) compensation; None where there are no data.
+
+    Constants as its maker publishes them: 0.4 A of cogging are 3 mN m, the rotor has about 2.5e-4 kg m^2.
+    """
+    source = os.environ.get(ODRIVE)
+    if not source:
+        return None
+    runs: dict[str, Recording] = {}
+    for k in range(3):
+        time, counts, current = scipy.io.loadmat(Path(source) / "slow2" / f"{kind}_{k}.mat")["data"]
+        order = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0)
+        angle = 2.0 * np.pi * np.unwrap(counts[order], period=COUNTS) / COUNTS
+        channels = {
+            "position": Channel("position", time[order], angle, "rad"),
+            "current": Channel("current", time[order], current[order], "A"),
+        }
+        title = "ODrive, very slow turns; G. Chen 2020, gchenfc/ODrive"
+        runs[f"{kind}_{k}"] = Recording(f"{kind}_{k}", channels, title=title, source=source, licence="MIT")
+    law = {"law": "coulomb_viscous", "tau_c": guessed(1e-3), "viscous": guessed(1e-4)}
+    document = {
+        "drive": {
+            "motor": {"name": "motor", "torque_constant": 3e-3 / 0.4},
+            "shafts": [{"name": "motor", "inertia": guessed(2.5e-4), "friction": law}],
+        },
+        "channels": {
+            "current": {"measures": "motor.current", "role": "input"},
+            "position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / COUNTS},
+        },
+    }
+    return write(folder, document, runs, [f"{kind}_2"])
