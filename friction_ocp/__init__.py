@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
     from friction_ocp.drafts.draft import init
+    from friction_ocp.effects.registry import register_effect
     from friction_ocp.errors import Finding, FrictionOcpError
     from friction_ocp.estimation.estimate import Estimate, Interrupted, Simulation, identify, simulate
     from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
     from friction_ocp.excitation.design import Design, design
     from friction_ocp.fleet.batch import Fleet, batch
+    from friction_ocp.friction.registry import register_law
     from friction_ocp.output_folder import save
     from friction_ocp.problem_file.check import check
     from friction_ocp.problem_file.load import load_problem
@@ -59,6 +61,8 @@ _HOMES = {
     "multistart": "statistics.multistart",
     "profile": "statistics.profile",
     "read_recording": "recording.hdf5",
+    "register_effect": "effects.registry",
+    "register_law": "friction.registry",
     "rerun": "repetition",
     "save": "output_folder",
     "simulate": "estimation.estimate",
@@ -96,6 +100,8 @@ __all__ = [
     "multistart",
     "profile",
     "read_recording",
+    "register_effect",
+    "register_law",
     "rerun",
     "save",
     "simulate",

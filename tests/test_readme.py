@@ -18,9 +18,11 @@ from friction_ocp.cli import _parser
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.drive.parts import Channel, Controller, ControllerType, Gravity, Motor, Shaft, Transmission
 from friction_ocp.effects import registry as effect_registry
+from friction_ocp.effects.registry import register_effect
 from friction_ocp.estimation.estimate import simulate
 from friction_ocp.friction import registry
 from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.registry import register_law
 from friction_ocp.problem_file.check import check
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.import_map import load_import_map
@@ -91,7 +93,8 @@ def test_the_law_that_it_adds_needs_one_class_and_one_line(tmp_path: Path, monke
     """Registered, the law of the README is read from a file, checked and simulated under its own parameter names."""
     names: dict[str, Any] = {"__name__": "shear_thinning"}
     exec(compile(blocks("python")[1], "README.md", "exec", dont_inherit=True), names)
-    monkeypatch.setattr(registry, "BUILT_IN", (*registry.BUILT_IN, names["ShearThinning"]))
+    monkeypatch.setattr(registry, "_registered", {})
+    assert register_law(names["ShearThinning"]) is names["ShearThinning"]
     document = servo_document()
     numbers = {
         key: {"guess": guess, "min": 0, "max": 20} for key, guess in (("tau_c", 0.01), ("tau_v", 0.05), ("omega_v", 3))
@@ -109,7 +112,8 @@ def test_the_effect_that_it_adds_is_found(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(example[example.index("class") :].splitlines()) <= 15
     names: dict[str, Any] = {"__name__": "rubbing"}
     exec(compile(example, "README.md", "exec", dont_inherit=True), names)
-    monkeypatch.setattr(effect_registry, "BUILT_IN", (*effect_registry.BUILT_IN, names["RubbingEffect"]))
+    monkeypatch.setattr(effect_registry, "_registered", {})
+    assert register_effect(names["RubbingEffect"]) is names["RubbingEffect"]
     monkeypatch.syspath_prepend(str(REPOSITORY / "tests" / "diagnosis"))
     cases = importlib.import_module("diagnosis_cases")
     path = cases.write_case(tmp_path, cases.axis(viscous=0.0))

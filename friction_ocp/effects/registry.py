@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.metadata import entry_points
+from typing import TypeVar
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import AbstractEffect
@@ -33,6 +34,8 @@ from friction_ocp.effects.periodic import (
 from friction_ocp.effects.sensors import SensorDelayEffect, SensorGainEffect, SensorOffsetEffect
 from friction_ocp.effects.stated_values import InertiaErrorEffect, ParameterErrorEffect
 from friction_ocp.effects.torques import ConstantTorqueEffect, StructuralModeEffect, UnbalanceEffect
+
+Effect = TypeVar("Effect", bound=type[AbstractEffect])
 
 BUILT_IN: tuple[type[AbstractEffect], ...] = (
     StribeckEffect,
@@ -65,9 +68,22 @@ BUILT_IN: tuple[type[AbstractEffect], ...] = (
 )
 
 
+_registered: dict[str, type[AbstractEffect]] = {}
+"""Effects that this process has made known, by name."""
+
+
+def register_effect(effect: Effect) -> Effect:
+    """Let an effect compete with the catalogue in this process, and return it: usable as a decorator.
+
+    Other processes know the effects of installed packages alone.
+    """
+    _registered[effect.name] = effect
+    return effect
+
+
 def effects() -> dict[str, AbstractEffect]:
     """Return all effects by name, those of installed packages (entry point `friction_ocp.effects`) included."""
-    known = {kind.name: kind() for kind in BUILT_IN}
+    known = {kind.name: kind() for kind in (*BUILT_IN, *_registered.values())}
     for point in entry_points(group="friction_ocp.effects"):
         kind: type[AbstractEffect] = point.load()
         known[kind.name] = kind()

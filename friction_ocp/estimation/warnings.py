@@ -84,5 +84,5 @@ def _misfit_warnings(doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Wh
             )
     for name, (errors, _) in scored.train_errors.items():
         if errors.noise_ratio > 2.0:
-            texts.append(f"{name}: the error of the free run is {errors.noise_ratio:.1f} times the noise floor.")
+            texts.append(f"{name}: the error of the free run is {errors.noise_ratio:.3g} times the noise floor.")
     return texts

@@ -15,11 +15,11 @@ from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, qui
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.model import prepare_fit
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.excitation.limits import Limits, limits_of
 from friction_ocp.excitation.motions import MOTIONS
-from friction_ocp.excitation.trial_run import TrialRun, trial_run
+from friction_ocp.excitation.trial_run import TrialRun, refuse_what_is_not_driven, trial_run
 from friction_ocp.excitation.worth import Evidence, evidence, information, known_information
 from friction_ocp.simulation.grid import FloatArray
 
@@ -68,8 +68,9 @@ def design(
     `between` names them as pairs of effect and component, such as ("stribeck", "motor"). Raises FrictionOcpError where
     one is named that there is not, or only one.
     """
+    refuse_what_is_not_driven(problem.drive)
     tell("base model", 0.0)
-    base = fit_base(prepare(problem))
+    base = fit_base(prepare_fit(problem))
     if not between:
         return sharpening(base, criterion, tell)
     entries = {(effect.name, place): effect for effect, place in candidates(problem.drive, list(effects()))}
@@ -152,4 +153,6 @@ def _mean_square(matrix: FloatArray, scale: FloatArray) -> float:
 
 
 def _std_errors(matrix: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix, rcond=1e-14)), 0.0))
+    """Return (parameters,) standard errors; scaled first, as stiffness and friction are many decades apart."""
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-14)), 0.0)) / size

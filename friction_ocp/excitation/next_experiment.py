@@ -63,8 +63,8 @@ def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> Fo
 
 
 def _text(keys: tuple[Key, ...], option: Option | None) -> str:
-    named = " or ".join(f"{effect} at {place}" for effect, place in keys)
-    hints = [f"{_EXCITATION[effect]} ({effect} at {place})" for effect, place in keys if effect in _EXCITATION]
+    named = " or ".join(_spoken(key) for key in keys)
+    hints = [f"{_EXCITATION[key[0]]} ({_spoken(key)})" for key in keys if key[0] in _EXCITATION]
     if option is None:
         return (
             f"No motion within the limits tells {named} apart with these channels: they say the same in other words, "
@@ -75,3 +75,8 @@ def _text(keys: tuple[Key, ...], option: Option | None) -> str:
         f"To tell {named} apart, record {run.motion.sentence}, up to {run.amplitude:.0%} of the allowed speed, as in "
         f"next_experiment.h5: one recording decides with a probability of {option.power or 0.0:.0%}."
     )
+
+
+def _spoken(key: Key) -> str:
+    effect, place = key
+    return f"{effect.replace('_', ' ')} at {place}"

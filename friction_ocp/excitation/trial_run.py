@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.drive.parts import Channel, Controller, Drive
+from friction_ocp.drive.parts import Channel, Controller, Drive, Motor
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -118,13 +118,14 @@ def _time(uses: tuple[RecordingUse, ...]) -> FloatArray:
 def _inputs(
     drive: Drive, recording: log.Recording, time: FloatArray, speed: FloatArray, limits: Limits
 ) -> dict[str, FloatArray]:
-    """Return the inputs: the motion for the reference, of everything else a typical value."""
+    """Return the inputs: the motion for the reference, motors switched on, of everything else a typical value."""
     found: dict[str, FloatArray] = {}
     for item in drive.inputs:
         if item.part == "reference":
             found[item.name] = speed if item.signal == "omega" else _within(time, speed, limits.travel)
         else:
-            found[item.name] = np.full(time.size, float(np.nanmedian(recording.channels[item.name].values)))
+            usual = np.nanmax if item.signal == "enable" else np.nanmedian
+            found[item.name] = np.full(time.size, float(usual(recording.channels[item.name].values)))
     return found
 
 
@@ -138,19 +139,43 @@ def _within(time: FloatArray, speed: FloatArray, travel: float) -> FloatArray:
 
 def _watched(drive: Drive) -> Drive:
     """Return the drive with sensors of its own for what the limits are about."""
-    first = drive.shafts[0].name
-    motor = next(item for item in drive.motors if item.shaft == first)
+    first, motor = drive.shafts[0].name, first_motor(drive)
     seen = {"theta": f"{first}.theta", "omega": f"{first}.omega", "torque": f"{motor.name}.torque"}
     known = {item.name for item in drive.channels}
     added = [Channel(LED + key, at, noise_std=1.0) for key, at in seen.items() if LED + key not in known]
     return replace(drive, channels=(*drive.channels, *added))
 
 
+def refuse_what_is_not_driven(drive: Drive) -> None:
+    """Raise FrictionOcpError for a drive whose motion no command of its first motor makes."""
+    motor = first_motor(drive)
+    if drive.controller is None:
+        _command(drive, motor)
+
+
+def first_motor(drive: Drive) -> Motor:
+    """Return the motor on the first shaft; raises FrictionOcpError where there is none."""
+    first = drive.shafts[0].name
+    for item in drive.motors:
+        if item.shaft == first:
+            return item
+    raise FrictionOcpError(Finding(f"design: {first}", "no motor drives the first shaft", "a motor on it"))
+
+
+def _command(drive: Drive, motor: Motor) -> Channel:
+    """Return the channel that commands a motor; raises FrictionOcpError where the motion itself is an input."""
+    for item in drive.inputs:
+        if item.part == motor.name and item.signal in _PER_TORQUE:
+            return item
+    what = "its current, torque or voltage is no input: where the motion itself is an input, none can be designed"
+    allowed = f"a channel that measures {motor.name}.current, role: input, or a controller"
+    raise FrictionOcpError(Finding(f"design: {motor.name}", what, allowed))
+
+
 def _looped(fitted: FittedModel, drive: Drive, limits: Limits) -> Drive:
     """Return a drive under a loop of speed that stands for whatever moves the machine: its command is recorded."""
-    first = drive.shafts[0].name
-    motor = next(item for item in drive.motors if item.shaft == first)
-    command = next(item for item in drive.inputs if item.part == motor.name and item.signal in _PER_TORQUE)
+    first, motor = drive.shafts[0].name, first_motor(drive)
+    command = _command(drive, motor)
     constant = float(motor.torque_constant)
     per_torque = {"torque": 1.0, "current": 1.0 / constant, "voltage": float(motor.resistance or 1.0) / constant}
     kind = command.signal.removesuffix("_command")

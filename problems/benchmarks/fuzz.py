@@ -34,8 +34,8 @@ from sound_files import MAPS, SUFFIXES, TEXT, sound_files
 
 LONGEST = 10.0
 """Seconds of processor time that one input may take, with the processes that its reader starts."""
-PATIENCE = 6.0
-"""How many times longer a process is waited for: it shares the machine with others."""
+PATIENCE = 60.0
+"""How many times longer a process is waited for: it may share a machine with many others, at the lowest priority."""
 MEMORY = 6 * 2**30
 Outcome = Literal["read", "refused", "traceback", "hang", "crash"]
 

@@ -11,10 +11,12 @@ import pytest
 import yaml
 from diagnosis_cases import axis, write_case
 from plant import Trajectory
+from servo_problem import REPOSITORY
 
 from friction_ocp.cli import main
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import RecordingUse
@@ -107,3 +109,26 @@ def test_candidates_that_there_are_not_are_named(path: Path) -> None:
     """A wrong candidate is refused with those that there are."""
     with pytest.raises(FrictionOcpError, match="stribeck@motor"):
         design(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)
+
+
+def test_a_motion_that_is_an_input_is_not_designed() -> None:
+    """The telescope whose motors are led by their speed has no command that a design could change."""
+    problem = load_problem(REPOSITORY / "problems" / "lto" / "joint.yaml")
+    with pytest.raises(FrictionOcpError, match="no input: where the motion itself is an input"):
+        design(problem)
+
+
+def test_nothing_to_fit_is_nothing_to_sharpen(path: Path) -> None:
+    """A problem of plain numbers alone is refused in words."""
+    problem = load_problem(path)
+    known = {"motor.inertia": 0.002, "motor.friction.tau_c": 0.1, "motor.friction.viscous": 0.001}
+    with pytest.raises(FrictionOcpError, match="nothing to fit"):
+        design(replace(problem, drive=bind_drive(problem.drive, known)))
+
+
+@pytest.mark.slow
+def test_a_motor_that_was_mostly_off_is_switched_on() -> None:
+    """The servo is free for most of its first recording; a designed motion drives it all the same."""
+    found = design(load_problem(REPOSITORY / "problems" / "xl330" / "coulomb_viscous.yaml"))
+    assert found.options[0].run.peaks["travel"] > 0.1
+    assert found.options[0].worth > 0.1
