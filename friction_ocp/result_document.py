@@ -15,6 +15,7 @@ import numpy as np
 
 from friction_ocp.estimation.curves import FrictionCurve
 from friction_ocp.estimation.estimate import Estimate, ParameterEstimate, Simulation
+from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.score import Errors, FreeRun
 from friction_ocp.estimation.static_points import StaticFit
@@ -42,6 +43,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
         **heading(estimate.problem),
         "warnings": list(estimate.warnings),
         "parameters": {item.name: _parameter(item) for item in estimate.parameters},
+        "process_noise": {item.shaft: _noise_level(item, estimate.problem) for item in estimate.noise_levels},
         "fit": _fit(estimate.simulation),
         "solver": {
             "name": estimate.solver.name,
@@ -109,6 +111,20 @@ def _parameter(item: ParameterEstimate) -> dict[str, Any]:
         "guess": item.guess,
         "verdict": item.verdict.word,
         "traded_with": list(item.verdict.traded_with),
+    }
+
+
+def _noise_level(item: NoiseLevel, problem: Problem) -> dict[str, Any]:
+    """Return an estimated level of torque noise under the keys of a parameter."""
+    low, high = (number(end) for end in item.interval95)
+    return {
+        "value": item.value,
+        "unit": item.unit,
+        "std_error": number(item.std_error),
+        "interval95": None if low is None or high is None else [low, high],
+        "guess": problem.estimation.process_noise.get(item.shaft),
+        "verdict": item.verdict,
+        "traded_with": [],
     }
 
 

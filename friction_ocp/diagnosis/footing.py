@@ -134,8 +134,13 @@ def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> 
 
 
 def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:
-    """Return the density of torque noise by shaft, N m/sqrt(Hz): stated, and from the noise of measured inputs."""
-    power = {shaft: density**2 for shaft, density in model.problem.estimation.process_noise.items()}
+    """Return the density of torque noise by shaft, N m/sqrt(Hz): stated, and from the noise of measured inputs.
+
+    Noise that is to be estimated counts for nothing here: it would take in the gap.
+    """
+    options = model.problem.estimation
+    stated = options.process_noise.keys() - set(options.estimated_noise)
+    power = {shaft: options.process_noise[shaft] ** 2 for shaft in sorted(stated)}
     for motor in model.problem.drive.motors:
         for channel in model.problem.drive.inputs:
             factor = _torque_factor(motor, channel, numbers)

@@ -17,7 +17,7 @@ from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, verdicts
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare, prepare_fit
-from friction_ocp.estimation.noise import NoiseFloor
+from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
@@ -93,6 +93,8 @@ class Estimate:
     curves: tuple[FrictionCurve, ...]
     warnings: tuple[str, ...]
     solver: SolverFacts
+    noise_levels: tuple[NoiseLevel, ...] = ()
+    """Torque noise that was estimated, by shaft."""
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -172,6 +174,7 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
             solution.objective,
             problem.estimation.starts,
         ),
+        noise_levels=model.noise_levels,
     )
 
 

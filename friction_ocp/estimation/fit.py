@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.noise_level import most_likely, starting_level, with_levels
 from friction_ocp.estimation.points_fit import fit_points
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
-from friction_ocp.estimation.rounds import Fitted, Plan, joined, staged, windowed
+from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, program_builder, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
 from friction_ocp.estimation.starts import start_points
 
 EXPECTED_PHASES = 16
+MOST_TURNS = 10
+SETTLED = 0.01
+"""Relative change of a level of torque noise, below which it and the parameters are found."""
 
 
 def fit(model: Model, progress: Progress = silent) -> Fitted:
@@ -38,9 +44,34 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 
 
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
-    """Fit, then shorten the integrator's steps as far as the answer depends on them; return the model with them."""
+    """Fit, with the torque noise where it is asked for, then shorten the integrator's steps as far as it matters.
+
+    Return the model with these levels and steps.
+    """
+    phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     fitted = fit(model, progress)
-    return refined(model, fitted, Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts))
+    if model.problem.estimation.estimated_noise and model.train:
+        model, fitted = weighed(model, fitted, phases)
+    return refined(model, fitted, phases)
+
+
+def weighed(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
+    """Estimate the torque noise along the fit, fit again with it, and so on until no level moves; return both.
+
+    Where free runs are fitted the noise is only reported: they know of none.
+    """
+    for turn in range(MOST_TURNS):
+        before = np.array([starting_level(model, shaft) for shaft in model.problem.estimation.estimated_noise])
+        levels = most_likely(model, fitted.program, fitted.solution.point)
+        model = with_levels(model, levels)
+        after = np.array([level.value for level in levels])
+        if fits_free_run(model) or np.all(np.abs(np.log(after / before)) <= SETTLED):
+            break
+        program = program_builder(model)(model, 0.0, fitted.program.loss)
+        watch = phases.begin(f"torque noise, turn {turn + 1}")
+        end = final_solver(model)(program, fitted.solution.point, limits(model), watch)
+        fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
+    return model, fitted
 
 
 def _fit_once(model: Model, phases: Phases) -> Fitted:

@@ -23,7 +23,7 @@ BRISTLE_GAP = 0.01
 def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     """Return (segments - 1, states, states) W with W'W the inverse covariance of each gap."""
     durations = np.diff(item.grid.time[first])[:-1]
-    if not model.problem.estimation.process_noise:
+    if not model.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations)))
     return np.asarray(roots, dtype=np.float64)
@@ -35,11 +35,14 @@ def gap_covariance(model: Model, item: Experiment, spans: FloatArray) -> FloatAr
     Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
     cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
     """
-    mech = model.drive.mechanism
     bristle = np.array([name.endswith(".friction.z") for name in model.drive.state_names])
     still = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
+    return torque_covariance(model.drive.mechanism, still, _group_noise(model, item), spans)
+
+
+def torque_covariance(mech: Mechanism, still: FloatArray, noise: FloatArray, spans: FloatArray) -> FloatArray:
+    """Return (spans, states, states): `still` (states, states), and what accelerations of density `noise` add to it."""
     covariance = np.tile(still, (spans.size, 1, 1))
-    noise = _group_noise(model, item)
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):
         v, q = len(mech.angle_groups) + k, position[group]
@@ -53,7 +56,7 @@ def gap_covariance(model: Model, item: Experiment, spans: FloatArray) -> FloatAr
 
 def _group_noise(model: Model, item: Experiment) -> FloatArray:
     numbers = model.space.numbers(model.space.guess, item.name)
-    return acceleration_noise(model.drive.mechanism, model.problem.estimation.process_noise, numbers)
+    return acceleration_noise(model.drive.mechanism, model.process_noise, numbers)
 
 
 def acceleration_noise(mech: Mechanism, densities: Mapping[str, float], numbers: FloatArray) -> FloatArray:

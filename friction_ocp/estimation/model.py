@@ -15,7 +15,7 @@ from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
-from friction_ocp.estimation.noise import NoiseFloor, noise_floor
+from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.static_points import StaticTerm, static_term
@@ -65,6 +65,13 @@ class Model:
     static: tuple[StaticTerm, ...] = ()
     """Static points that are fitted."""
     static_validation: tuple[StaticTerm, ...] = ()
+    noise_levels: tuple[NoiseLevel, ...] = ()
+    """Torque noise that was estimated."""
+
+    @property
+    def process_noise(self) -> Mapping[str, float]:
+        """Torque noise by shaft, N m/sqrt(Hz): stated, guessed or estimated."""
+        return {**self.problem.estimation.process_noise, **{item.shaft: item.value for item in self.noise_levels}}
 
     @property
     def noise(self) -> FloatArray:

@@ -1,9 +1,10 @@
-"""The noise floor of a channel, which never comes from the fit under test."""
+"""The noise floor of a channel, which never comes from the fit under test, and the torque noise of a shaft."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +19,23 @@ class NoiseFloor:
 
     std: float
     source: str
+
+
+LevelWord = Literal["ok", "at_bound", "not_identifiable"]
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """Torque noise of one shaft, N m/sqrt(Hz); N/sqrt(Hz) where the motion is linear."""
+
+    shaft: str
+    value: float
+    std_error: float
+    """NaN where the recordings do not tell it."""
+    interval95: tuple[float, float]
+    """Normal in the logarithm of the level."""
+    verdict: LevelWord
+    unit: str
 
 
 def noise_floor(channel: Channel, signals: list[tuple[FloatArray, FloatArray]]) -> NoiseFloor:

@@ -61,6 +61,8 @@ class EstimationOptions:
     """Samples in a segment of the relaxed problem."""
     process_noise: Mapping[str, float] = field(default_factory=dict[str, float])
     """Torque noise by shaft, N m/sqrt(Hz)."""
+    estimated_noise: tuple[str, ...] = ()
+    """Shafts whose torque noise is estimated; what `process_noise` says of them is a guess."""
     loss: Loss = "squares"
     horizon_s: float | None = None
     initial_state: InitialState = "estimated"

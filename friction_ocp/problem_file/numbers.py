@@ -33,6 +33,26 @@ class FittedNumber(Section):
         return Free(self.guess, self.min, self.max, self.prior_std, self.prior_mean, self.scope)
 
 
+class GuessedLevel(Section):
+    """A level of noise to be estimated."""
+
+    guess: Positive
+
+
+def read_noise_level(value: Any) -> float | GuessedLevel | None:
+    """Read a level of noise: known, to be estimated from a guess, or to be estimated (None)."""
+    if value == "estimate":
+        return None
+    if isinstance(value, dict):
+        return GuessedLevel.model_validate(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
+        raise refuse("noise", [Fault((), f"this is {shown(value)}", "a number >= 0, estimate, or {guess: ...}")])
+    return float(value)
+
+
+NoiseNumber = Annotated[Any, PlainValidator(read_noise_level)]
+
+
 class TiedNumber(Section):
     """A number computed from others."""
 

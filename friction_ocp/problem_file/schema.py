@@ -23,7 +23,15 @@ from friction_ocp.drive.parts import (
 from friction_ocp.estimation.problem import EstimationOptions, Fit, InitialState, Loss, Solver
 from friction_ocp.parameters import Value
 from friction_ocp.problem_file.friction_section import read_friction
-from friction_ocp.problem_file.numbers import Finite, NotNegative, Number, Positive, read_number
+from friction_ocp.problem_file.numbers import (
+    Finite,
+    GuessedLevel,
+    NoiseNumber,
+    NotNegative,
+    Number,
+    Positive,
+    read_number,
+)
 from friction_ocp.problem_file.sections import (
     NUMBER_FORMS,
     ChannelName,
@@ -222,7 +230,7 @@ class EstimationSection(Section):
     solver: Solver = "gauss_newton"
     fit: Fit | None = None
     segment: Annotated[int, Field(ge=1)] = 50
-    process_noise: dict[str, NotNegative] = Field(default_factory=dict[str, float])
+    process_noise: dict[str, NoiseNumber] = Field(default_factory=dict[str, Any])
     loss: Loss = "squares"
     horizon_s: Positive | None = None
     initial_state: InitialState = "estimated"
@@ -232,7 +240,14 @@ class EstimationSection(Section):
     max_step: Positive | None = None
 
     def build(self) -> EstimationOptions:
-        return EstimationOptions(**given(self, *self.keys()))
+        stated = {
+            name: item.guess if isinstance(item, GuessedLevel) else item for name, item in self.process_noise.items()
+        }
+        return EstimationOptions(
+            **given(self, *(key for key in self.keys() if key != "process_noise")),
+            process_noise={name: level for name, level in stated.items() if level is not None},
+            estimated_noise=tuple(name for name, item in self.process_noise.items() if not isinstance(item, float)),
+        )
 
 
 class DiagnosisSection(Section):

@@ -63,6 +63,7 @@ def render_report(result: Json, series: Series) -> str:
             "statistic": drawn_section(result),
             "warnings": rows(result, "warnings"),
             "parameters": parameter_rows(objects(result, "parameters")),
+            "process_noise": parameter_rows(objects(result, "process_noise")),
             "horizon": plain(part(result, "fit").get("horizon_s")),
             "whole": part(result, "fit").get("horizon_s") is None,
             "fit": fit_rows(part(result, "fit")),

@@ -21,6 +21,9 @@ def summary(result: Mapping[str, Any]) -> str:
     if statistic is not None:
         return "\n".join([*lines, *(line for table in statistic.tables for line in (*table_lines(table), ""))]).rstrip()
     lines += _parameter_lines(result["parameters"])
+    lines += _parameter_lines(
+        {f"torque noise on {name}": item for name, item in result.get("process_noise", {}).items()}
+    )
     for name, errors in result["fit"]["train"].items():
         lines.append(f"free run, training    {name}: {_error(errors)}")
     for name, errors in result["fit"]["validation"].items():

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.estimation.estimate import Estimate, conclude
-from friction_ocp.estimation.fit import fit
+from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.progress import Progress, silent
@@ -57,10 +57,19 @@ def fit_start(workshop: Workshop, start: Sequence[float]) -> Json:
     return _optimum(replace(model, space=model.space.moved(np.array(start, dtype=np.float64)))).document()
 
 
+def align(workshop: Workshop, content: Json) -> Json:
+    """Solve again from the end of another fit, with the integrator steps and torque noise of the optimum at hand."""
+    other, model = Optimum.read(content), workshop.model
+    program = workshop.fitted.program
+    end = resolve(model, program, other.solution.point)
+    iterations = end.iterations + other.solution.iterations
+    return replace(Optimum.of(model, workshop.fitted), solution=replace(end, iterations=iterations)).document()
+
+
 def _optimum(model: Model, progress: Progress = silent) -> Optimum:
     """Fit, then solve once more from the end: profiles and refits measure their gains from there."""
-    found = Optimum.of(fit(model, progress))
-    fitted = found.fitted(model)
+    model, fitted = settled(model, progress)
+    found = Optimum.of(model, fitted)
     again = resolve(model, fitted.program, found.solution.point)
     if not again.objective < found.solution.objective:
         return found

@@ -13,7 +13,7 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.starts import start_points
 from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
-from friction_ocp.statistics.answer import concluded, fit_start
+from friction_ocp.statistics.answer import align, concluded, fit_start
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.optimum import Optimum
 from friction_ocp.statistics.workshop import Workshop
@@ -82,7 +82,7 @@ def multistart(problem: Problem, starts: int | None = None, execution: Execution
     workshop = Workshop(single)
     points = start_points(workshop.model.space, count, problem.estimation.seed)
     tasks = [Task(f"start-{k:03d}", fit_start, (point.tolist(),)) for k, point in enumerate(points)]
-    outcomes = list(execution.run("starts", tasks, workshop).values())
+    outcomes = _aligned(list(execution.run("starts", tasks, workshop).values()), workshop, execution)
     finished = [outcome for outcome in outcomes if outcome.value is not None and outcome.value["objective"] is not None]
     if not finished:
         what = f"every start failed, the first with: {outcomes[0].error or 'the simulation breaks down'}"
@@ -94,6 +94,27 @@ def multistart(problem: Problem, starts: int | None = None, execution: Execution
     clusters = _clusters([end.optimum for end in ends], _tolerance(estimate))
     joined = tuple(replace(end, cluster=cluster) for end, cluster in zip(ends, clusters, strict=True))
     return MultiStart(estimate, joined)
+
+
+def _aligned(outcomes: list[Outcome], workshop: Workshop, execution: Execution) -> list[Outcome]:
+    """Return all ends with the integrator steps and torque noise of the best: else objectives do not compare."""
+    ends = [Optimum.read(outcome.value) if outcome.value else None for outcome in outcomes]
+    found = [end for end in ends if end is not None and np.isfinite(end.solution.objective)]
+    if not found:
+        return outcomes
+    best = min(found, key=_objective)
+    odd = [k for k, end in enumerate(ends) if np.isfinite(_objective(end)) and not _alike(end, best)]
+    tasks = [Task(f"aligned-{k:03d}", align, (outcomes[k].value,)) for k in odd]
+    if not tasks:
+        return outcomes
+    again = execution.run("the same steps", tasks, workshop.at(best)).values()
+    for k, outcome in zip(odd, again, strict=True):
+        outcomes[k] = replace(outcome, seconds=outcome.seconds + outcomes[k].seconds)
+    return outcomes
+
+
+def _alike(end: Optimum | None, best: Optimum) -> bool:
+    return end is not None and (end.max_step, end.noise_levels) == (best.max_step, best.noise_levels)
 
 
 def _end(start: FloatArray, outcome: Outcome) -> StartEnd:

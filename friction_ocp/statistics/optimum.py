@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.model import Model, with_step
+from friction_ocp.estimation.noise import NoiseLevel
+from friction_ocp.estimation.noise_level import with_levels
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
@@ -24,14 +26,22 @@ class Optimum:
 
     solution: Solution
     loss: AbstractLoss
+    max_step: float
+    """Longest integrator step that it was found with, s."""
+    noise_levels: tuple[NoiseLevel, ...] = ()
+    """Torque noise that was estimated."""
 
     @classmethod
-    def of(cls, fitted: Fitted) -> Optimum:
-        """Take the end of a fit without its program."""
-        return cls(fitted.solution, fitted.program.loss)
+    def of(cls, model: Model, fitted: Fitted) -> Optimum:
+        """Take the end of a fit, and what of its model was settled on the way, without its program."""
+        return cls(fitted.solution, fitted.program.loss, model.max_step, model.noise_levels)
+
+    def settled(self, model: Model) -> Model:
+        """Return the model with the integrator steps and the torque noise that the fit ended with."""
+        return with_levels(with_step(model, self.max_step), self.noise_levels)
 
     def fitted(self, model: Model) -> Fitted:
-        """Return the fit with the program that it ended with: exact friction, the loss as it was."""
+        """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
         return Fitted(self.solution, program_builder(model)(model, 0.0, self.loss))
 
     def document(self) -> dict[str, Any]:
@@ -45,15 +55,35 @@ class Optimum:
                 "nodes": [nodes.tolist() for nodes in solution.point.nodes],
             },
             "objective": float(objective) if np.isfinite(objective) else None,
+            "max_step": self.max_step,
+            "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
 
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> Optimum:
         """Return the optimum that `document` describes."""
-        facts = {key: value for key, value in content.items() if key not in ("point", "loss", "objective")}
+        names = {item.name for item in dataclasses.fields(Solution)} - {"point", "objective"}
+        facts = {key: value for key, value in content.items() if key in names}
         nodes = tuple(np.array(item, dtype=np.float64) for item in content["point"]["nodes"])
         point = Point(np.array(content["point"]["theta"], dtype=np.float64), nodes)
         objective = np.inf if content["objective"] is None else float(content["objective"])
         numbers = dict(content["loss"])
-        return cls(Solution(point=point, objective=objective, **facts), LOSSES[numbers.pop("name")](**numbers))
+        loss = LOSSES[numbers.pop("name")](**numbers)
+        levels = tuple(_level(item) for item in content["noise_levels"])
+        return cls(Solution(point=point, objective=objective, **facts), loss, float(content["max_step"]), levels)
+
+
+def _plain(level: NoiseLevel) -> dict[str, Any]:
+    """Return a level as plain values; what is not known becomes None."""
+    known = level.verdict == "ok"
+    told = {"std_error": level.std_error if known else None, "interval95": list(level.interval95) if known else None}
+    return {**dataclasses.asdict(level), **told}
+
+
+def _level(content: Mapping[str, Any]) -> NoiseLevel:
+    """Return the level that `_plain` describes."""
+    level = NoiseLevel(**content)
+    if level.verdict != "ok":
+        return dataclasses.replace(level, std_error=np.nan, interval95=(np.nan, np.nan))
+    return dataclasses.replace(level, interval95=(float(level.interval95[0]), float(level.interval95[1])))

@@ -22,8 +22,9 @@ class Workshop:
 
     @cached_property
     def model(self) -> Model:
-        """The problem made ready to compute."""
-        return prepare_fit(self.problem)
+        """The problem made ready to compute, with what was settled at the optimum."""
+        model = prepare_fit(self.problem)
+        return model if self.optimum is None else self.optimum.settled(model)
 
     @cached_property
     def fitted(self) -> Fitted:
@@ -47,7 +48,7 @@ class Workshop:
         """Return the same problem at its optimum, with the model if that is built."""
         moved = Workshop(self.problem, optimum)
         if "model" in self.__dict__:
-            moved.__dict__["model"] = self.model
+            moved.__dict__["model"] = optimum.settled(self.model)
         return moved
 
     def __getstate__(self) -> dict[str, Any]:

@@ -6,21 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from axes import COULOMB, CURRENT, INERTIA, TORQUE_CONSTANT, VISCOUS
-from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, steps_and_multisine
+from axes import COULOMB, INERTIA, VISCOUS
+from stiff_axis import SIGMA0, stiff_problem
 
-from friction_ocp.drive.parts import Channel as Sensor
-from friction_ocp.drive.parts import Drive, Motor, Shaft
 from friction_ocp.estimation.fit import fit, settled
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare
-from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
-from friction_ocp.friction.bristle import Dahl
-from friction_ocp.friction.element import FrictionElement
-from friction_ocp.parameters import Free
-from friction_ocp.recording.recording import Channel, Recording
 
-SIGMA0 = 20.0
 STILL = 0.1
 """Standard errors that half the step may move an estimate."""
 FAR = 4.5
@@ -28,27 +20,7 @@ FAR = 4.5
 
 
 def _model(noise: float, **options: Any) -> Model:
-    """A shaft with a stiff bristle, seen by an encoder of this noise."""
-    rng = np.random.default_rng(3)
-    current = steps_and_multisine(np.array([0.5, 1.0, 2.0]), (0.1, 0.25), 0.3, (0.5, 40.0), 2.0, rng)
-    friction = PlantFriction("dahl", tau_c=COULOMB, sigma0=SIGMA0, viscous=VISCOUS)
-    plant = Plant(
-        shafts=(PlantShaft("motor", INERTIA, friction),),
-        motors=(PlantMotor("drive", "motor", torque_constant=TORQUE_CONSTANT),),
-        sensors=(PlantSensor("position", "motor.theta", period=1e-3, noise_std=noise),),
-    )
-    (stamps, values) = plant.simulate(2.0, {"drive.current": current}, rng).channels["position"]
-    channels = {
-        "position": Channel("position", stamps, values, "rad"),
-        "current": Channel("current", np.asarray(current.time), np.asarray(current.value), "A"),
-    }
-    law = Dahl(Free(0.9 * COULOMB, 0.0), Free(1.1 * SIGMA0, 0.0), Free(VISCOUS, 0.0))
-    shaft = Shaft("motor", Free(INERTIA), FrictionElement(law))
-    held = Sensor("current", CURRENT.measures, role="input", hold="zero")
-    channels_of_drive = (held, Sensor("position", "motor.theta", noise_std=noise))
-    drive = Drive((shaft,), (), (Motor("drive", "motor", TORQUE_CONSTANT),), channels=channels_of_drive)
-    use = RecordingUse(Recording("run", channels))
-    return prepare(Problem("stiff", drive, (use,), estimation=EstimationOptions(fit="simulation", **options)))
+    return prepare(stiff_problem(noise, **options))
 
 
 def _off(model: Model, theta: np.ndarray, std_error: np.ndarray) -> np.ndarray:

@@ -108,6 +108,14 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
 }
 
 MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "noise that is no level": (
+        put("estimation", {"process_noise": {"load": "often"}}),
+        "estimation.process_noise.load: this is 'often'; a number >= 0, estimate, or {guess: ...}",
+    ),
+    "noise with a negative guess": (
+        put("estimation", {"process_noise": {"load": {"guess": -1.0}}}),
+        "estimation.process_noise.load.guess: ",
+    ),
     "bounds the wrong way round": (
         put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 1, "max": 0}),
         "drive.shafts[0].friction.tau_c: min = 1 N m is above max = 0 N m; min below max; swap them",

@@ -81,6 +81,22 @@ def test_example_of_the_interface_is_read(tmp_path: Path) -> None:
     assert check(problem) == ()
 
 
+def test_torque_noise_is_known_or_estimated(workshop: Workshop) -> None:
+    """A level is a number, or found from a guess or without one."""
+
+    def noisy(value: Any) -> tuple[dict[str, float], tuple[str, ...]]:
+        def spoil(content: dict[str, Any]) -> None:
+            content["estimation"] = {"process_noise": {"load": value}}
+
+        options = load_problem(workshop.problem(spoil)).estimation
+        return dict(options.process_noise), options.estimated_noise
+
+    assert noisy(0.1) == ({"load": 0.1}, ())
+    assert noisy(0) == ({"load": 0.0}, ())
+    assert noisy({"guess": 0.2}) == ({"load": 0.2}, ("load",))
+    assert noisy("estimate") == ({}, ("load",))
+
+
 def test_sound_problem_has_no_finding(workshop: Workshop) -> None:
     """A sound problem with a sound recording is passed without a word."""
     assert workshop.messages(workshop.problem()) == []

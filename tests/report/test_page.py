@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plotly.offline import get_plotlyjs
-from report_example import Result, Series, identified
+from report_example import Result, Series, identified, parameter
 
 from friction_ocp.report import write_report
 from friction_ocp.report.payload import embedded_json
@@ -62,11 +62,20 @@ def test_every_parameter_stands_there_with_value_unit_and_verdict(page: str) -> 
     result, _ = identified(200)
     rows = {row[0]: row for row in re.findall(r'<th scope="row" data-key="([^"]+)">(.*?)</tr>', page, flags=re.DOTALL)}
     assert list(rows) == list(result["parameters"])
-    for name, parameter in result["parameters"].items():
-        assert f'data-key="{parameter["value"]}"' in rows[name][1]
-        assert f'data-key="{parameter["unit"]}"' in rows[name][1]
-        assert parameter["verdict"].replace("_", " ") in rows[name][1]
-        assert all(f'data-key="{other}"' in rows[name][1] for other in parameter["traded_with"])
+    for name, item in result["parameters"].items():
+        assert f'data-key="{item["value"]}"' in rows[name][1]
+        assert f'data-key="{item["unit"]}"' in rows[name][1]
+        assert item["verdict"].replace("_", " ") in rows[name][1]
+        assert all(f'data-key="{other}"' in rows[name][1] for other in item["traded_with"])
+
+
+def test_torque_noise_stands_below_the_parameters(tmp_path: Path) -> None:
+    """An estimated level is shown with its interval; without one there is no such table."""
+    result, series = identified(600)
+    assert "Torque noise" not in Elements(page_of(result, series, tmp_path)).text
+    noise = {"motor": parameter(1.04e-3, "N m/sqrt(Hz)", 6.0e-5, 1.0e-3)}
+    text = Elements(page_of({**result, "process_noise": noise}, series, tmp_path)).text
+    assert "Torque noise by maximum likelihood" in text and "0.00104" in text and "[0.000922, 0.001158]" in text
 
 
 def test_the_sections_come_in_the_order_of_a_readers_questions(page: str) -> None:

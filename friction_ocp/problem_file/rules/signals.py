@@ -214,7 +214,8 @@ def delay_needs_a_sample_time(case: Case) -> Iterator[Finding]:
 def process_noise_acts_on_shafts(case: Case) -> Iterator[Finding]:
     """Process noise is a torque on a shaft that exists."""
     names = [shaft.name for shaft in case.drive.shafts]
-    for name in case.problem.estimation.process_noise:
+    options = case.problem.estimation
+    for name in dict.fromkeys((*options.process_noise, *options.estimated_noise)):
         if name not in names:
             where = case.at(f"estimation.process_noise.{name}")
             yield Finding(where, f"unknown shaft '{name}'", f"there are {', '.join(names)}", closest(name, names))
