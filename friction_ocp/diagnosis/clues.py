@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 
@@ -10,11 +12,13 @@ from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
+from friction_ocp.drive.parts import Motor
 from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Track
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import relaxed
+from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import Squares
 
@@ -30,7 +34,23 @@ def clues_of(fitted: FittedModel) -> Clues:
     first = fitted.model.train[0].name
     numbers = fitted.model.space.numbers(fitted.theta, first)
     by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
-    return Clues(tracks, by_path, _typical_torques(fitted, tracks, by_path))
+    return Clues(tracks, by_path, _typical_torques(fitted, tracks, by_path), _steady_speeds(fitted, by_path))
+
+
+def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Return the speeds of all shafts at static points, which state that of the first shaft."""
+    drive, terms = fitted.model.problem.drive, fitted.model.static
+    if not terms:
+        return {}
+    found = {drive.shafts[0].name: np.concatenate([term.speed for term in terms])}
+    for _ in drive.transmissions:
+        for item in drive.transmissions:
+            ratio = numbers.get(f"{item.from_shaft}-{item.to_shaft}.ratio", 1.0)
+            if item.from_shaft in found and item.to_shaft not in found:
+                found[item.to_shaft] = found[item.from_shaft] / ratio
+            elif item.to_shaft in found and item.from_shaft not in found:
+                found[item.from_shaft] = found[item.to_shaft] * ratio
+    return found
 
 
 def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
@@ -101,12 +121,22 @@ def _smoothers(fitted: FittedModel) -> tuple[LinearRecording, ...]:
     return tuple(LinearRecording(program, index, point) for index in range(len(items)))
 
 
+def _per_unit(term: StaticTerm, motor: Motor, numbers: Mapping[str, float]) -> float:
+    """Return the torque of a motor per unit of what static points hold."""
+    return numbers.get(f"{motor.name}.torque_constant", 1.0) if term.effort == "current" else 1.0
+
+
 def _typical_torques(fitted: FittedModel, tracks: tuple[Track, ...], numbers: dict[str, float]) -> dict[str, float]:
-    """Return the rms of motor torques, carried through the ratios to every shaft; 1 where there is no motor."""
+    """Return the rms of motor torques, carried through the ratios to every shaft; 1 where there is no motor.
+
+    A motor without current, whose shaft is moved by an input, does what static points say.
+    """
     drive = fitted.model.problem.drive
     found: dict[str, float] = {}
     for motor in drive.motors:
         values = np.concatenate([track.torque[motor.name] for track in tracks])
+        if not np.any(values) and fitted.model.static:
+            values = np.concatenate([term.measured * _per_unit(term, motor, numbers) for term in fitted.model.static])
         found[motor.shaft] = max(float(np.sqrt(np.mean(values**2))), 1e-12)
     for _ in drive.transmissions:
         for item in drive.transmissions:

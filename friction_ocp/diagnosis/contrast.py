@@ -12,6 +12,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import stepped
 from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
+from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.kernel import SweepRequest, empty_result
 from friction_ocp.simulation.sweep import Sweep
@@ -28,6 +29,8 @@ class Contrast:
     sweep: Sweep
     known: Mapping[str, float]
     """Fitted values of the base model by parameter name."""
+    static: tuple[StaticTerm, ...] = ()
+    """Static points under the candidate."""
 
     def columns(self, values: list[Mapping[str, float]]) -> FloatArray:
         """Return (rows, k) what each set of added values does, nodes solved for, parameters not yet absorbed."""
@@ -36,6 +39,7 @@ class Contrast:
             changes = [self._change(index, item, self.theta(at)) for at in values]
             by_y, by_end = (np.stack(column, axis=2) for column in zip(*changes, strict=True))
             parts.append(item.change(by_y, by_end))
+        parts += [self._static_change(k, values) for k in range(len(self.static))]
         prior = self.base.rows.residual.size - sum(part.shape[0] for part in parts)
         return np.concatenate([*parts, np.zeros((prior, len(values)))])
 
@@ -43,6 +47,13 @@ class Contrast:
         """Return all fitted parameters of the candidate: those of the base model and the added ones."""
         at = {**self.known, **values}
         return np.array([at.get(name, self.space.guess[k]) for k, name in enumerate(self.space.names)])
+
+    def _static_change(self, index: int, values: list[Mapping[str, float]]) -> FloatArray:
+        """Return (points, k) what each set of added values does to static points."""
+        term, before = self.static[index], self.base.program.static[index]
+        still = before.predict(self.model.space, self.base.point.theta)
+        moved = [term.predict(self.space, self.theta(at)) for at in values]
+        return np.column_stack([(one - still) / before.std_error for one in moved])
 
     def _change(self, index: int, item: LinearRecording, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         y, end, _ = self.simulate(index, item, theta)
@@ -81,4 +92,5 @@ def contrast(model: Model, base: LinearProgram, drive: Drive) -> Contrast:
     after = stepped(drive)
     space = parameter_space(replace(model.problem, drive=drive), after.parameter_names)
     known = dict(zip(model.space.names, base.point.theta, strict=True))
-    return Contrast(model, base, space, Sweep(after, (), values_only=True), known)
+    static = tuple(static_term(use, drive, space) for use in model.problem.static)
+    return Contrast(model, base, space, Sweep(after, (), values_only=True), known, static)

@@ -278,11 +278,11 @@ def samples(fitted: FittedModel) -> int:
 
 def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator, required: float) -> Round:
     current, blocks = crew.bench.current, crew.bench.blocks
-    places = [(effect.name, place) for effect, place in candidates(current.model.problem.drive, names)]
-    found = crew.screened(places)
+    found = crew.screened(_places(current, names))
     power = excess(current.linear.rows, blocks)
-    hopeful = [item for item in found if item.gain >= HOPE * required]
-    shortlist = _shortlist(hopeful, PLAUSIBLE if power.significant(level) else level / max(len(found), 1))
+    hopeful, gap = [item for item in found if item.gain >= HOPE * required], power.significant(level)
+    large = OF_REST * max(current.objective - 0.5 * samples(current), 0.0)
+    shortlist = _shortlist(hopeful, PLAUSIBLE, large) if gap else _shortlist(hopeful, level / max(len(found), 1))
     rivals = _rivals(crew, shortlist)
     able = [_gain(current, item) >= required and _is_material(current, item.fitted) for item in rivals]
     choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
@@ -291,16 +291,20 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     return Round(tuple(found), with_refused(choice, refused), current, power, best)
 
 
-def _shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
+def _shortlist(found: Sequence[Screened], limit: float, large: float = np.inf) -> list[Screened]:
     """Return candidates that are worth a refit.
 
-    Where there is a gap for certain, a mere sign of significance is enough as the limit: the decision is made on
-    recordings left out. Otherwise it is corrected for the number of candidates (Bonferroni).
+    Where there is a gap for certain, a mere sign of significance is enough as the limit, or a `large` predicted gain,
+    which may come from a few blocks alone: the decision is made on recordings left out. Otherwise the limit is
+    corrected for the number of candidates (Bonferroni). Places compete: an effect that is worth it at one of them is
+    refitted at the others, too.
     """
-    significant = [item for item in found if item.p_value < limit and item.gain > 0]
+    significant = [item for item in found if (item.p_value < limit or item.gain >= large) and item.gain > 0]
     if not significant:
         return []
-    return [item for item in significant if item.gain >= WORTH_REFITTING * significant[0].gain][:REFITTED]
+    worth = WORTH_REFITTING * significant[0].gain
+    named = {item.effect for item in significant if item.gain >= worth}
+    return [item for item in found if item.effect in named and item.gain >= worth][:REFITTED]
 
 
 def _rivals(crew: Crew, shortlist: Sequence[Screened]) -> list[Rival]:
@@ -318,7 +322,27 @@ def _rivals(crew: Crew, shortlist: Sequence[Screened]) -> list[Rival]:
     return crew.rivals(kept, without)
 
 
+def _places(current: FittedModel, names: list[str]) -> list[Key]:
+    """Return effects and places; static points also show friction of shafts whose motion an input prescribes."""
+    drive = current.model.problem.drive
+    places = [(effect.name, place) for effect, place in candidates(drive, names)]
+    prescribed = {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
+    if not current.model.static or not prescribed:
+        return places
+    channels = tuple(replace(item, role="output") if item.part in prescribed else item for item in drive.channels)
+    free = candidates(replace(drive, channels=channels), names)
+    return list(dict.fromkeys([*places, *((effect.name, place) for effect, place in free if place in prescribed)]))
+
+
 def _is_material(current: FittedModel, fitted: FittedModel) -> bool:
-    """Whether an addition takes away more of the free-run error than the floors are in doubt by."""
+    """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points."""
     before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
-    return bool(before.excess() - after.excess() > MATERIAL * (1.0 + after.excess()))
+    pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
+    return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
+
+
+def _static_excess(fitted: FittedModel) -> float:
+    """Return the mean square of static points' errors over their standard errors, beyond 1."""
+    rows = fitted.linear.rows
+    own = np.isin(rows.recording, rows.static)
+    return max(0.0, float(np.mean(rows.residual[own] ** 2)) - 1.0) if np.any(own) else 0.0

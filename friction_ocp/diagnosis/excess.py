@@ -27,7 +27,10 @@ class Excess:
 
 
 def excess(rows: Rows, blocks: Blocks) -> Excess:
-    """Test whether the mean power of the blocks exceeds what noise gives (one-sided t test over blocks)."""
+    """Test whether the mean power of the blocks exceeds what noise gives (one-sided t test over blocks).
+
+    Static points are independent of one another: each set is tested by itself, too (chi-square; Bonferroni).
+    """
     samples = (rows.channel >= 0) & (rows.residual != 0.0)
     power, count = blocks.sums(rows.residual**2), blocks.sums(samples.astype(float))
     told = count > 0
@@ -38,4 +41,8 @@ def excess(rows: Rows, blocks: Blocks) -> Excess:
     spread = float(np.std(ratios, ddof=1)) / np.sqrt(ratios.size)
     limit = (1.0 + FLOOR_DOUBT) ** 2
     statistic = (float(np.mean(ratios)) - limit) / max(spread, 1e-300)
-    return Excess(mean, float(stats.t.sf(statistic, ratios.size - 1)))
+    tests = [float(stats.t.sf(statistic, ratios.size - 1))]
+    for number in rows.static:
+        errors = rows.residual[rows.recording == number]
+        tests.append(float(stats.chi2.sf(float(errors @ errors) / limit, errors.size)))
+    return Excess(mean, min(1.0, len(tests) * min(tests)))

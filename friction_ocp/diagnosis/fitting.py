@@ -20,11 +20,11 @@ from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
-QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=5)
+QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=10)
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
 BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
@@ -221,7 +221,34 @@ def held_out(fitted: FittedModel) -> FloatArray:
             nodes = item.nodes + item.moved_by(theta - fitted.theta)
             costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT))
     found = [costs[k] for k in range(len(program.experiments))]
+    found += [_held_out_points(fitted, k) for k in range(len(program.static))]
     return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
+
+
+def _held_out_points(fitted: FittedModel, index: int) -> FloatArray:
+    """Return (points,) costs of static points under parameters that every fourth of them took no part in.
+
+    Static points are nearly linear in the parameters: one step.
+    """
+    program, rows = fitted.linear.program, fitted.linear.rows
+    term, own = program.static[index], np.flatnonzero(rows.recording == len(program.experiments) + index)
+    costs = np.zeros(own.size)
+    for part in range(MOST_FOLDS):
+        at = np.arange(own.size) % MOST_FOLDS == part
+        left = np.isin(np.arange(rows.residual.size), own[at])
+        step = _step_without(fitted, left)[0] if fitted.theta.size else np.zeros(0)
+        errors, _ = term.residuals(fitted.model.space, fitted.theta + step)
+        costs[at] = 0.5 * errors[at] ** 2
+    return costs
+
+
+def _step_without(fitted: FittedModel, left: BoolArray) -> tuple[FloatArray, float]:
+    """Return the step of the parameters that leaves some rows out, and what it is predicted to gain on the others."""
+    rows, kept = fitted.linear.rows, ~left
+    information = rows.jacobian[kept].T @ rows.jacobian[kept] + SHRINK * rows.jacobian[left].T @ rows.jacobian[left]
+    pull = rows.jacobian[kept].T @ rows.residual[kept]
+    step = fitted.model.space.clip(fitted.theta - _solve(information, pull)) - fitted.theta
+    return step, -float(pull @ step) - 0.5 * float(step @ information @ step)
 
 
 def _without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
@@ -230,11 +257,7 @@ def _without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
     others = [k for k in range(len(program.experiments)) if k not in group]
     if not others or not fitted.theta.size:
         return fitted.theta
-    kept, left = np.isin(rows.recording, others) | (rows.recording < 0), np.isin(rows.recording, group)
-    information = rows.jacobian[kept].T @ rows.jacobian[kept] + SHRINK * rows.jacobian[left].T @ rows.jacobian[left]
-    pull = rows.jacobian[kept].T @ rows.residual[kept]
-    step = fitted.model.space.clip(fitted.theta - _solve(information, pull)) - fitted.theta
-    predicted = -float(pull @ step) - 0.5 * float(step @ information @ step)
+    step, predicted = _step_without(fitted, np.isin(rows.recording, group))
     rest = _some(program, others)
     before = rest.objective(Point(fitted.theta, tuple(point.nodes[k] for k in others)))
     moved = tuple(fitted.linear.recordings[k].nodes + fitted.linear.recordings[k].moved_by(step) for k in others)

@@ -70,8 +70,9 @@ class Footing:
         return Program(model.space, model.drive, model.sweep, experiments, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
-        """Return the likelihood of the training recordings; the grids are those of the model."""
-        return self.program(model, tuple(self._regridded(item, model) for item in self.train))
+        """Return the likelihood of training recordings and static points; the grids are those of the model."""
+        regridded = tuple(self._regridded(item, model) for item in self.train)
+        return replace(self.program(model, regridded), static=model.static)
 
     def _regridded(self, item: Experiment, model: Model) -> Experiment:
         stepped = replace(item, grid=item.grid.with_step(model.max_step))

@@ -20,13 +20,15 @@ class Rows:
     jacobian: FloatArray
     """(rows, parameters) along the manifold of solved nodes."""
     recording: IntArray
-    """(rows,) index of the recording."""
+    """(rows,) index of the recording; sets of static points are numbered on, -1 for priors."""
     time: FloatArray
-    """(rows,) s."""
+    """(rows,) s; the number of a static point."""
     channel: IntArray
     """(rows,) output column; -1 for gaps, -2 for starts and priors."""
     node: IntArray
     """(rows,) grid node of the row."""
+    static: tuple[int, ...] = ()
+    """Numbers of the sets of static points, as `recording` has them."""
 
     def absorbed(self, columns: FloatArray) -> FloatArray:
         """Return what is left of columns once the parameters have absorbed what they can."""
@@ -238,22 +240,30 @@ class LinearProgram:
     rows: Rows
 
 
+def _static_labels(count: int) -> tuple[FloatArray, IntArray, IntArray]:
+    nothing = np.zeros(count, dtype=np.int64)
+    return np.arange(count, dtype=float), nothing, nothing
+
+
 def linear_program(program: Program, point: Point) -> LinearProgram:
     """Linearise a program."""
     items = tuple(LinearRecording(program, index, point) for index in range(len(program.experiments)))
     labels = [item.labels() for item in items]
     space = program.space
+    static = [term.residuals(space, point.theta) for term in program.static]
+    labels += [_static_labels(errors.size) for errors, _ in static]
     prior = np.flatnonzero(np.isfinite(space.prior_std))
     pull = np.zeros((prior.size, point.theta.size))
     pull[np.arange(prior.size), prior] = 1.0 / space.prior_std[prior]
     errors = (point.theta[prior] - space.prior_mean[prior]) / space.prior_std[prior]
     none = np.full(prior.size, -1)
     rows = Rows(
-        residual=np.concatenate([*(item.residual for item in items), errors]),
-        jacobian=np.concatenate([*(item.jacobian for item in items), pull]),
-        recording=np.concatenate([*(np.full(item.residual.size, k) for k, item in enumerate(items)), none]),
+        residual=np.concatenate([*(item.residual for item in items), *(seen for seen, _ in static), errors]),
+        jacobian=np.concatenate([*(item.jacobian for item in items), *(slope for _, slope in static), pull]),
+        recording=np.concatenate([*(np.full(label[0].size, k) for k, label in enumerate(labels)), none]),
         time=np.concatenate([*(label[0] for label in labels), np.zeros(prior.size)]),
         channel=np.concatenate([*(label[1] for label in labels), np.full(prior.size, -2)]),
         node=np.concatenate([*(label[2] for label in labels), np.zeros(prior.size, int)]),
+        static=tuple(range(len(items), len(labels))),
     )
     return LinearProgram(program, point, items, rows)

@@ -49,6 +49,8 @@ class Clues:
     """Every number of the drive in the first recording, by path."""
     typical_torque: Mapping[str, float]
     """By shaft, N m: what moves it."""
+    steady: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """By shaft, rad/s: speeds at which static points were taken, where there are any."""
 
     def speeds(self, shaft: str) -> FloatArray:
         """Return all speeds of a shaft, rad/s."""
@@ -89,8 +91,11 @@ class Clues:
         return [float(1.0 / frequencies[k]) for k in _peaks(power)]
 
     def speed_quantiles(self, shaft: str, shares: Sequence[float]) -> list[float]:
-        """Return speeds below which the shaft moves for the given shares of the time that it moves at all."""
-        speed = np.abs(self.speeds(shaft))
+        """Return speeds below which the shaft moves for the given shares of the time that it moves at all.
+
+        Of static points, where there are any: they lie where somebody wanted to see friction.
+        """
+        speed = np.abs(self.steady.get(shaft, self.speeds(shaft)))
         moving = speed[speed > 1e-3 * float(np.max(speed, initial=0.0))]
         return [float(value) for value in np.quantile(moving, shares)] if moving.size else [1.0 for _ in shares]
 

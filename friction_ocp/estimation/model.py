@@ -147,6 +147,8 @@ def with_drive(model: Model, drive: Drive) -> Model:
         speed_scale=_speed_scale(after, states),
         state_scale=_state_scale(states),
         max_step=max_step,
+        static=tuple(static_term(use, drive, space) for use in problem.static),
+        static_validation=tuple(static_term(use, drive, space) for use in problem.static_validation),
     )
 
 

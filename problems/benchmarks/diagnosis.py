@@ -62,7 +62,7 @@ def _word(passed: bool | None) -> str:
 def telescopes(line: str, quick: bool) -> Check:
     """Diagnose the Leighton telescope with each kind of friction, and ARIES with each left out."""
     told: list[str] = []
-    wanted = {"fast": ("polyline_break", "motor"), "slow": ("polyline_break", "load")}
+    wanted = {"high": ("polyline_break", "motor"), "low": ("polyline_break", "load")}
     wanted |= {"quadratic": ("quadratic_drag", "motor")}
     marks: list[bool] = []
     for kind, key in wanted.items():
@@ -88,9 +88,11 @@ def real_machines(line: str, quick: bool) -> Check:
 def _servo() -> tuple[str, bool]:
     seen = diagnosed("xl330", ROOT / "problems" / "xl330" / "coulomb_viscous.yaml")
     error = mean_absolute(seen.found.after)
-    meant = {effect for one in seen.sets for effect, _ in one if ("load_dependence" in {name for name, _ in one})}
+    accepted = [effect for effect, _ in seen.found.accepted]
+    alias = [{effect for effect, _ in one} for one in seen.sets]
     text = f"{seen.told}; validation error {mean_absolute(seen.found.before):.4f} -> {error:.4f} rad"
-    return text, "load_dependence" in meant and meant <= {"load_dependence", "warm_up"} and error <= MOST_ERROR
+    named = "load_dependence" in accepted or {"load_dependence", "warm_up"} in alias
+    return text, named and error <= MOST_ERROR
 
 
 def mean_absolute(errors: FreeErrors) -> float:

@@ -23,7 +23,6 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import aries  # noqa: E402
-import leighton  # noqa: E402
 from plant import (  # noqa: E402
     Plant,
     PlantController,
@@ -111,65 +110,18 @@ def driven(plant: Plant, seconds: float, levels: np.ndarray, amplitude: float, s
     return plant.simulate(seconds, {"motor.current": current}, rng).channels
 
 
-LTO_SECONDS, LTO_DAMPING = 8.0, 2.0e5
-LTO_FAST, LTO_SLOW = (0.11, 0.0003), (0.0347, 0.0003)
-"""Coulomb and viscous friction of both sides at the motor, N m and N m s/rad."""
-
-
 def lto(kind: str, folder: Path) -> Path:
-    """Write one chain of the Leighton telescope under a speed loop, its model with straight friction lines."""
-    fast = {"fast": leighton.fast_polyline(), "quadratic": leighton.fast_quadratic()}.get(kind, leighton.fast_linear())
-    slow = leighton.slow_polyline() if kind == "slow" else leighton.slow_friction()
-    plain = leighton.lumped(fast, slow, LTO_DAMPING)
-    loop = PlantController(
-        "loop", "pi_velocity", "loop_encoder", kp=0.14, ki=0.7, sample_time=STEP, saturation=(-25.0, 25.0)
-    )
-    motor = PlantMotor("motor", "motor", "current", leighton.TORQUE_CONSTANT, controller="loop")
-    sensors = (
-        PlantSensor("motor_position", "motor.theta", STEP, resolution=2.0 * np.pi / 2**14),
-        PlantSensor("load_position", "load.theta", STEP, resolution=2.0 * np.pi / 2**26),
-        PlantSensor("current", "motor.current", STEP, noise_std=0.005),
-        PlantSensor("loop_encoder", "motor.theta", STEP, resolution=2.0 * np.pi / 2**20),
-    )
-    plant = Plant(plain.shafts, plain.transmissions, (motor,), (loop,), sensors)
-    runs = {name: recorded(plant, name, _slewed(plant, k + 1)) for k, name in enumerate(RUNS)}
-    return write(folder, _lto_model(), runs, RUNS[2:])
-
-
-def _slewed(plant: Plant, seed: int) -> Mapping[str, Any]:
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, LTO_SECONDS, 0.8)
-    speed = leighton.SLEW * rng.uniform(0.15, 1.0, time.size) * np.where(np.arange(time.size) % 2, -1.0, 1.0)
-    wanted = Trajectory(time, np.where(time > 0, speed, 0.0), "linear")
-    return plant.simulate(LTO_SECONDS, {"reference.omega": wanted}, rng).channels
-
-
-def _lto_model() -> Document:
-    fast = {"law": "coulomb_viscous", "tau_c": guessed(LTO_FAST[0]), "viscous": guessed(LTO_FAST[1])}
-    ratio = leighton.RATIO
-    slow = {
-        "law": "coulomb_viscous",
-        "tau_c": guessed(ratio * LTO_SLOW[0]),
-        "viscous": guessed(ratio**2 * LTO_SLOW[1]),
-    }
-    return {
-        "drive": {
-            "motor": {"name": "motor", "torque_constant": leighton.TORQUE_CONSTANT},
-            "shafts": [
-                {"name": "motor", "inertia": leighton.MOTOR_INERTIA, "friction": fast},
-                {"name": "load", "inertia": 0.5 * leighton.LOAD_INERTIA, "friction": slow},
-            ],
-            "transmissions": [
-                {"ratio": ratio, "stiffness": guessed(leighton.STIFFNESS), "damping": guessed(LTO_DAMPING)}
-            ],
-        },
-        "channels": {
-            "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": 0.005},
-            "motor_position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / 2**14},
-            "load_position": {"measures": "load.theta", "resolution": 2.0 * np.pi / 2**26},
-        },
-        "estimation": {"fit": "simulation"},
-    }
+    """Write the Leighton telescope of `data/lto` with straight lines of friction on both sides as its model."""
+    content = yaml.safe_load((ROOT / "problems" / "lto" / "joint.yaml").read_text(encoding="utf-8"))
+    viscous = {"guess": 0.002, "min": -0.02, "max": 0.1}
+    law = {"law": "coulomb_viscous", "tau_c": {"guess": 0.05, "min": 0, "max": 1}, "viscous": viscous}
+    content["drive"]["shafts"][0]["friction"] = law
+    data = ROOT / "data" / "lto" / kind
+    used = content["recordings"].items()
+    content["recordings"] = {split: [str(data / Path(file).name) for file in files] for split, files in used}
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path
 
 
 def aries_axis(left_out: str, folder: Path) -> Path:
