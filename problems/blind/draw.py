@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from plant import PlantTransmission
 
-from blind.cases import EFFECTS, TRAIN, Case, Planted, case_of, read_answer, write_answer, write_case
+from blind.cases import EFFECTS, HANDBOOK, TRAIN, Case, Planted, case_of, read_answer, write_answer, write_case
 from blind.catalogue import CATALOGUE
+from blind.document import handbook
 from blind.machines import MACHINES
 from blind.outside import OUTSIDE
 from blind.recording import Hidden
@@ -28,6 +31,8 @@ CLASHES = (
     ("parameter_error", "backlash", "stiffening", "transmission_hysteresis"),
 )
 """Effects of which a part has one at most: they rewrite the same numbers of the plant."""
+BEYOND = 4.0
+"""Deviations of its prior from which a fitted number is wrong for certain; a diagnosis names it from three."""
 KIND_STREAM, TURN_STREAM = 10_000, 20_000
 
 
@@ -98,7 +103,40 @@ def plant(case: Case, effect: Effect, rng: np.random.Generator) -> Planted | Non
         return effect.inject(site, np.random.default_rng(form))
 
     size, ratio = size_for(View(machine, tuple(runs)), build, target)
-    return Planted(effect.name, component, size, form, ratio) if LOST <= ratio <= EXCESSIVE else None
+    found = Planted(effect.name, component, size, form, ratio)
+    return found if LOST <= ratio <= EXCESSIVE and contradicts(case, found) else None
+
+
+def contradicts(case: Case, found: Planted) -> bool:
+    """Whether a wrong value is one: stands fixed in the file, or lies beyond what its prior allows.
+
+    A number that is fitted takes the true value; with less than that many deviations nothing is wrong with the file.
+    """
+    machine = case.make_machine()
+    template, document = machine.document["drive"], handbook(machine.document, case.stream(HANDBOOK))["drive"]
+    site = Site(machine, case.scales(), Hidden(machine.plant()), found.component, found.size)
+    plant = EFFECTS[found.effect].inject(site, np.random.default_rng(found.seed)).plant
+    pairs: list[tuple[Any, float]] = []
+    if found.effect == "inertia_error":
+        places = zip(document["shafts"], plant.shafts, strict=True)
+        pairs = [(item["inertia"], shaft.inertia) for item, shaft in places if shaft.name == found.component]
+    elif found.effect == "parameter_error" and found.component == template["motor"]["name"]:
+        pairs = [(document["motor"]["torque_constant"], plant.motors[0].torque_constant)]
+    elif found.effect == "parameter_error" and "-" in found.component:
+        places = zip(document["transmissions"], plant.transmissions, strict=True)
+        pairs = [(item["stiffness"], joint.stiffness) for item, joint in places if _name(joint) == found.component]
+    return all(_is_off(stated, true) for stated, true in pairs)
+
+
+def _name(joint: PlantTransmission) -> str:
+    return f"{joint.from_shaft}-{joint.to_shaft}"
+
+
+def _is_off(stated: Any, true: float) -> bool:
+    if not isinstance(stated, Mapping):
+        return True
+    spread = stated.get("prior_std")
+    return spread is not None and abs(true - stated["guess"]) > BEYOND * spread
 
 
 def make(seed: int, index: int, folder: Path) -> Case:
