@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.estimation.division import divided
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
@@ -17,6 +18,8 @@ from friction_ocp.simulation.losses import Squares
 
 ENTRANCE = Tolerances(max_iterations=25)
 """Of a fit that one more recording has just come into."""
+BOLD = replace(ENTRANCE, first_damping=1e-6)
+"""Of a fit that begins anew at the end of another."""
 RENEWALS, WORTHWHILE = 10, 1e-4
 """How often the fit of all begins anew, and what share of the objective that has to gain."""
 
@@ -30,32 +33,38 @@ def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:
     """Fit relaxed segments of all recordings, let in one after another; static points take part from the first.
 
     The next one is that whose short segments along the measured motion the parameters so far explain best: small
-    motion near rest comes before large motion that only right parameters follow.
+    motion near rest comes before large motion that only right parameters follow. It starts along its measured motion,
+    the others where they were.
     """
     theta, taken, left = model.space.guess, (), list(model.train)
+    nodes: tuple[FloatArray, ...] = ()
     while True:
         left.sort(key=lambda item: _mismatch(model, item, theta), reverse=True)
         taken = (*taken, left.pop())
         program = relaxed(model, taken, 0.0, Squares())
         watch = phases.begin(f"{len(taken)} of {len(model.train)} recordings")
-        start = Point(theta, program.suggested_nodes(theta))
+        start = Point(theta, (*nodes, *program.suggested_nodes(theta)[len(nodes) :]))
         end = solve_gauss_newton(program, start, ENTRANCE, watch)
-        theta = end.point.theta
+        theta, nodes = end.point.theta, end.point.nodes
         if not left:
-            return _in_order(_renewed(program, end, phases), program, model)
+            return _in_order(*_renewed(model, program, end, phases), model)
 
 
-def _renewed(program: Program, end: Solution, phases: Phases) -> Solution:
-    """Begin anew where a few segments at kinks of the friction made the damping grow, which holds back all others."""
+def _renewed(model: Model, program: Program, end: Solution, phases: Phases) -> tuple[Solution, Program]:
+    """Begin anew where a few segments made the damping grow, which holds back all others.
+
+    Segments in which differences grow are cut, and first steps are bold: kinks of the friction stop small ones.
+    """
     for k in range(RENEWALS):
         if end.converged and end.smooth:
             break
-        after = solve_gauss_newton(program, end.point, ENTRANCE, phases.begin(f"renewal {k + 1}"))
+        program, start = divided(model, program, end.point)
+        after = solve_gauss_newton(program, start, BOLD, phases.begin(f"renewal {k + 1}"))
         after = replace(after, iterations=end.iterations + after.iterations)
-        gained, end = end.objective - after.objective, after
+        gained, end = program.objective(start) - after.objective, after
         if end.converged and gained <= WORTHWHILE * end.objective:
             break
-    return end
+    return end, program
 
 
 def _mismatch(model: Model, item: Experiment, theta: FloatArray) -> float:

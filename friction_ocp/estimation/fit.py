@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.detours import detour, hop
+from friction_ocp.estimation.division import reweighed
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model
@@ -15,10 +16,9 @@ from friction_ocp.estimation.points_fit import fit_points
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
-from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, program_builder, staged, windowed
+from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
 from friction_ocp.estimation.starts import start_points
-from friction_ocp.estimation.synchronise import synchronised
 
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
@@ -45,12 +45,12 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 
 
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
-    """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
+    """Fit, with the torque noise where it is asked for, then shorten the integrator's steps as far as it matters.
 
-    Return the model with these stamps, levels and steps.
+    Return the model with these levels and steps.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
-    model, fitted = synchronised(model, fit(model, progress), phases)
+    fitted = fit(model, progress)
     if model.problem.estimation.estimated_noise and model.train:
         model, fitted = weighed(model, fitted, phases)
     return refined(model, fitted, phases)
@@ -68,7 +68,7 @@ def weighed(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
         after = np.array([level.value for level in levels])
         if fits_free_run(model) or np.all(np.abs(np.log(after / before)) <= SETTLED):
             break
-        program = program_builder(model)(model, 0.0, fitted.program.loss)
+        program = reweighed(model, fitted.program)
         watch = phases.begin(f"torque noise, turn {turn + 1}")
         end = final_solver(model)(program, fitted.solution.point, limits(model), watch)
         fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)

@@ -25,24 +25,30 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     durations = np.diff(item.grid.time[first])[:-1]
     if not model.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
-    roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations)))
+    shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.segment)
+    roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)
 
 
-def gap_covariance(model: Model, item: Experiment, spans: FloatArray) -> FloatArray:
+def gap_covariance(model: Model, item: Experiment, spans: FloatArray, shares: FloatArray | float = 1.0) -> FloatArray:
     """Return (spans, states, states) the covariances that torque noise gathers over `spans` s in angles and speeds.
 
     Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
-    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
+    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2). What no noise enters may jump a little over a segment,
+    and by as much in sum where it is cut: `shares` of a segment are the spans.
     """
     bristle = np.array([name.endswith(".friction.z") for name in model.drive.state_names])
     still = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
-    return torque_covariance(model.drive.mechanism, still, _group_noise(model, item), spans)
+    part = still * np.broadcast_to(shares, spans.shape)[:, None, None]
+    return torque_covariance(model.drive.mechanism, part, _group_noise(model, item), spans)
 
 
 def torque_covariance(mech: Mechanism, still: FloatArray, noise: FloatArray, spans: FloatArray) -> FloatArray:
-    """Return (spans, states, states): `still` (states, states), and what accelerations of density `noise` add to it."""
-    covariance = np.tile(still, (spans.size, 1, 1))
+    """Return (spans, states, states): `still` (states, states), and what accelerations of density `noise` add to it.
+
+    `still` may differ by span: (spans, states, states).
+    """
+    covariance = np.broadcast_to(still, (spans.size, *still.shape[-2:])).copy()
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):
         v, q = len(mech.angle_groups) + k, position[group]

@@ -58,6 +58,8 @@ class Tolerances:
     stalled: float = 1e-4
     """The same, where no damped step decreases the objective any more (kinks of the friction law)."""
     max_iterations: int = 100
+    first_damping: float = FIRST_DAMPING
+    """Of the first step: small at the end of another fit, where kinks stop small steps and not large ones."""
 
 
 USUAL = Tolerances()
@@ -99,7 +101,7 @@ def solve_gauss_newton(
     system = program.linearise(point)
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
-    now = _Iterate(point, system, Trust(FIRST_DAMPING, np.diag(system.theta_theta)))
+    now = _Iterate(point, system, Trust(tolerances.first_damping, np.diag(system.theta_theta)))
     vanished, slow = VANISHED * system.objective, 0
     for iteration in range(1, tolerances.max_iterations + 1):
         following = _descend(program, now, tolerances)

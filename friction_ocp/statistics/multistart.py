@@ -114,11 +114,7 @@ def _aligned(outcomes: list[Outcome], workshop: Workshop, execution: Execution) 
 
 
 def _alike(end: Optimum | None, best: Optimum) -> bool:
-    return end is not None and (end.max_step, end.noise_levels, end.moves) == (
-        best.max_step,
-        best.noise_levels,
-        best.moves,
-    )
+    return end is not None and (end.max_step, end.noise_levels) == (best.max_step, best.noise_levels)
 
 
 def _end(start: FloatArray, outcome: Outcome) -> StartEnd:

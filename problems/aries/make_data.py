@@ -4,8 +4,9 @@ python problems/aries/make_data.py [--seed 1] [--only PART]. Torque noise 1 N m,
 an incremental PI at 5 ms with the gains of tests/aries.py. Parts:
 
 curve: 30 speeds x 5 positions x 4 passes x 2 directions under the loop, 10 ms logs, averaged over the second half of a
-run. A run whose speed swings by more than a fifth of its mean is a limit cycle: `curve_<direction>.h5` leaves it out,
-`curve_all_<direction>.h5` averages it too, as the paper does.
+run. A run whose speed swings by more than a fifth of its mean is a limit cycle, and so is one slower than five counts
+of the loop's encoder in a sample: the loop then hunts from count to count, faster than the noisy log shows.
+`curve_<direction>.h5` leaves these out, `curve_all_<direction>.h5` averages them too, as the paper does.
 responses: torque steps and a slow ramp at 1 ms, a step logged at 10 ms, a slow loop below breakaway, and speed runs.
 """
 
@@ -56,7 +57,11 @@ def held_speed(
 
 
 def averages(log: dict[str, tuple[np.ndarray, np.ndarray]]) -> tuple[float, float, float]:
-    """Return mean speed and mean torque of the second half of a log, and the swing of its speed over the mean."""
+    """Return mean speed and mean torque of the second half of a log, and the swing of its speed over the mean.
+
+    The swing is at least the quantum of the loop's speed, one count in a sample, over the mean: friction that is convex
+    over the speed is not the mean torque of such a run.
+    """
     time, position = log["position"]
     late = time > 0.5 * time[-1]
     mean_speed = abs(position[late][-1] - position[late][0]) / (time[late][-1] - time[late][0])
@@ -65,7 +70,8 @@ def averages(log: dict[str, tuple[np.ndarray, np.ndarray]]) -> tuple[float, floa
     angle = position[late][: late.sum() // block * block].reshape(-1, block).mean(axis=1)
     speeds = np.diff(angle) / (block * SLOW_LOG)
     mean = float(np.mean(speeds))
-    return mean, float(np.mean(log["torque"][1][late])), float(np.std(speeds) / max(abs(mean), 1e-12))
+    swing = max(float(np.std(speeds)), aries.LOOP_STEP / aries.SAMPLE_TIME) / max(abs(mean), 1e-12)
+    return mean, float(np.mean(log["torque"][1][late])), swing
 
 
 def curves(seed: int) -> dict[str, StaticPoints]:

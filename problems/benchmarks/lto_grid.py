@@ -17,13 +17,13 @@ import argparse
 import importlib.util
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
+from tracing import Trace, counted
 
 from friction_ocp.estimation.agreement import curve_distance
 from friction_ocp.estimation.estimate import identify
@@ -33,9 +33,7 @@ from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Report
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.problem_file.load import load_problem
-from friction_ocp.simulation.kernel import SweepRequest
 from friction_ocp.simulation.losses import Squares
-from friction_ocp.simulation.sweep import Sweep
 
 HERE = Path(__file__).resolve()
 ROOT = HERE.parents[2]
@@ -57,43 +55,6 @@ def make_data() -> ModuleType:
 
 DATA = make_data()
 RATIO = DATA.leighton.RATIO
-
-
-@dataclass
-class Trace:
-    """Evaluations and seconds at which a search had which parameter error."""
-
-    begun: float = field(default_factory=time.perf_counter)
-    evaluations: int = 0
-    points: list[tuple[int, float, float]] = field(default_factory=list)
-
-    def note(self, error: float) -> None:
-        """Add the error of the best parameters so far."""
-        self.points.append((self.evaluations, time.perf_counter() - self.begun, error))
-
-    def until(self, error: float) -> tuple[int, float]:
-        """Return evaluations and seconds after which the error is that small for good."""
-        small = [point[2] <= error for point in self.points]
-        last = max((k for k, good in enumerate(small) if not good), default=-1)
-        at = self.points[min(last + 1, len(small) - 1)]
-        return at[0], at[1]
-
-
-def counted(trace: Trace) -> Callable[[], None]:
-    """Count every simulation in a trace until the function returned is called."""
-    original = Sweep.run_many
-
-    def run_many(self: Sweep, requests: Sequence[SweepRequest]) -> Any:
-        for request in requests:
-            trace.evaluations += 1 + (len(self.active) if request.derivatives else 0)
-        return original(self, requests)
-
-    Sweep.run_many = run_many  # type: ignore[method-assign]
-
-    def restore() -> None:
-        Sweep.run_many = original  # type: ignore[method-assign]
-
-    return restore
 
 
 def numbers_of(values: Numbers) -> Numbers:

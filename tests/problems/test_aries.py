@@ -98,7 +98,7 @@ def test_the_bristle_is_found_from_small_steps(direction: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", SIDES)
 def test_all_eight_numbers_are_found_jointly_from_a_guess_of_no_expert(direction: str) -> None:
-    """Tables 1 and 2 from curve, steps, ramp and motion in one program: within 5 %, sigma1 within 10 %, delta 0.05."""
+    """Tables 1 and 2 from curve, steps, ramp and motion in one program: within 3 %, sigma1 within 10 %, delta 0.05."""
     problem = load_problem(ARIES / f"joint_{direction}.yaml")
     estimate = identify(problem)
     assert estimate.converged
@@ -107,7 +107,7 @@ def test_all_eight_numbers_are_found_jointly_from_a_guess_of_no_expert(direction
     truth = {"sigma2" if name == "viscous" else name: value for name, value in truth.items()}
     for name, value in truth.items():
         found = estimate.values[f"axis.friction.{name}"]
-        assert found == pytest.approx(value, rel=0.1 if name == "sigma1" else 0.05), name
+        assert found == pytest.approx(value, rel=0.1 if name == "sigma1" else 0.03), name
     assert estimate.values["axis.inertia"] == pytest.approx(aries.INERTIA, rel=0.03)
     assert estimate.values["axis.friction.delta"] == pytest.approx(aries.DELTA, abs=0.05)
 

@@ -1,0 +1,71 @@
+"""Segments cut into shorter ones where small differences grow, as at breakaway."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.estimation.gap import gap_weights
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+GROWTH = 4.0
+"""Factor by which differences at the start of a segment may grow to its end. Beyond it a step that its linearisation
+promises much of leaves where that holds, and the damping that this calls for holds back all other segments."""
+
+
+def divided(model: Model, program: Program, point: Point) -> tuple[Program, Point]:
+    """Return relaxed segments of which none lets differences grow by more than GROWTH, new nodes on their motion.
+
+    Differences grow by the largest eigenvalue of the end of a segment by its start, whatever the units of the states.
+    The same program and point where nothing is to cut.
+    """
+    cut_again: list[Segments] = []
+    nodes: list[FloatArray] = []
+    for index, (item, cut) in enumerate(zip(program.experiments, program.segments, strict=True)):
+        track = program.simulate(index, point, derivatives=True, with_states=True)
+        assert track.states is not None and track.dend is not None
+        first = _divided(cut.first, _growth(track.dend[:, :, : track.states.shape[1]]))
+        own = track.states[first[:-1]].copy()
+        own[np.searchsorted(first, cut.first[:-1])] = point.nodes[index]
+        nodes.append(own)
+        start = _start_weight(cut, first.size - 1)
+        cut_again.append(replace(cut, first=first, gap_weight=gap_weights(model, item, first), start_weight=start))
+    if all(new.count == old.count for new, old in zip(cut_again, program.segments, strict=True)):
+        return program, point
+    return replace(program, segments=tuple(cut_again)), Point(point.theta, tuple(nodes))
+
+
+def reweighed(model: Model, program: Program) -> Program:
+    """Return relaxed segments, cut as they are, with the gaps that the torque noise of a model allows."""
+    pairs = zip(program.experiments, program.segments, strict=True)
+    again = tuple(replace(cut, gap_weight=gap_weights(model, item, cut.first)) for item, cut in pairs)
+    return replace(program, segments=again)
+
+
+def _start_weight(cut: Segments, count: int) -> FloatArray | None:
+    """Return the weights of the priors on `count` nodes: the first keeps its own, the others have none."""
+    if cut.start_weight is None:
+        return None
+    rest = np.zeros((count - 1, cut.start_weight.shape[1]))
+    return np.concatenate([cut.start_weight[:1], rest])
+
+
+def _growth(slopes: FloatArray) -> FloatArray:
+    """Return (segments,) the factor by which differences grow; (segments, states, states) end by start."""
+    usable = np.all(np.isfinite(slopes), axis=(1, 2))
+    factor = np.ones(len(slopes))
+    factor[usable] = np.max(np.abs(np.linalg.eigvals(slopes[usable])), axis=1)
+    return factor
+
+
+def _divided(first: IntArray, growth: FloatArray) -> IntArray:
+    """Return the first nodes of segments cut into as many equal parts as their growth asks for and nodes allow."""
+    parts = np.ceil(np.log(np.maximum(growth, 1.0)) / np.log(GROWTH) - 1e-9)
+    parts = np.clip(parts, 1, np.diff(first))
+    edges: list[FloatArray] = []
+    for start, end, count in zip(first[:-1], first[1:], parts, strict=True):
+        edges.append(float(start) + float(end - start) / float(count) * np.arange(int(count), dtype=np.float64))
+    return np.append(np.concatenate(edges), first[-1]).astype(np.int64)
