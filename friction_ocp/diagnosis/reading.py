@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from friction_ocp.drive.parts import Channel
+import numpy as np
+
+from friction_ocp.diagnosis.blocks import blocks_of
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
+from friction_ocp.diagnosis.fitting import FittedModel, polished
+from friction_ocp.diagnosis.worth import OF_REST, Key, prescribed
+from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.model import with_drive
 from friction_ocp.estimation.problem import Problem
 
 _DRIVING = ("current", "current_command", "torque", "voltage")
@@ -33,3 +43,40 @@ def corrections(stated: Problem, read: Problem) -> list[str]:
         for item in read.drive.channels
         if item.hold != before[item.name]
     ]
+
+
+def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool) -> bool:
+    """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest."""
+    ratio = innovations(final).ratio
+    fewer = [[other for other in accepted if other != key] for key in accepted]
+    if any(_ratio_with(base, keys, final) <= ratio * (1.0 + FLOOR_DOUBT) ** 2 for keys in fewer):
+        return True
+    return left_over and _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * max(ratio - 1.0, 0.0)
+
+
+def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
+    """Return the power of the innovations of a base model with some additions, fitted from where they were before."""
+    if not keys:
+        return innovations(base).ratio
+    model = with_drive(base.model, with_additions(base, keys))
+    known = {**base.values, **final.values}
+    theta = np.array([known.get(name, guess) for name, guess in zip(model.space.names, model.space.guess, strict=True)])
+    return innovations(polished(model, base.footing, theta, None)).ratio
+
+
+def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
+    """Return the drive of the base model with some effects, as they would be added in this order.
+
+    Values that were taken back are no part of it: they are fitted in the base model already.
+    """
+    drive, clues = base.model.problem.drive, clues_of(base)
+    for effect, place in keys:
+        if place in {*effects()[effect].places(drive), *prescribed(drive)}:
+            drive = effects()[effect].augment(drive, place, clues).drive
+    return drive
+
+
+def innovations(fitted: FittedModel) -> Excess:
+    """Return the power of the innovations over the noise."""
+    rows = fitted.linear.rows
+    return excess(rows, blocks_of(rows))

@@ -26,7 +26,7 @@ def input_symbols(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
         inputs[channel.name] = ca.SX.sym(channel.name)
         if _needs_slope(channel, structure):
             inputs[f"{channel.name}'"] = ca.SX.sym(f"{channel.name}'")
-    if any(_depends_on_time(shaft) for shaft in drive.shafts):
+    if any(_depends_on_time(shaft) for shaft in drive.shafts) or any(map(drive.clock_of, drive.outputs)):
         inputs[TIME] = ca.SX.sym(TIME)
     if findings := list(warm_up_faults(drive)):
         raise FrictionOcpError(findings)

@@ -199,10 +199,24 @@ class Controller:
 
 
 @dataclass(frozen=True)
+class Clock:
+    """The clock of a logger beside the others: it shows t + offset + drift t, t being the time since the start."""
+
+    name: str
+    offset: Value = quantity("time", "what the clock is fast by at the start", 0.0)
+    drift: Value = quantity("dimensionless", "what the clock gains in a second", 0.0)
+
+    @property
+    def path(self) -> str:
+        """What its numbers are named by."""
+        return f"clocks.{self.name}"
+
+
+@dataclass(frozen=True)
 class Channel:
     """A recorded signal: recorded(t) = gain * true(t - delay) + offset, quantised by `resolution`.
 
-    With `eccentricity` true is what an eccentric sensor of the angle sees.
+    With `eccentricity` true is what an eccentric sensor of the angle sees; with `clock` t is what that clock shows.
     """
 
     name: str
@@ -215,6 +229,8 @@ class Channel:
     noise_std: float | None = None
     hold: Hold = "linear"
     eccentricity: Eccentricity | None = None
+    clock: str = ""
+    """Name of the clock that stamps it; empty for that of the recording."""
 
     @property
     def part(self) -> str:
@@ -236,6 +252,7 @@ class Drive:
     motors: tuple[Motor, ...] = ()
     controller: Controller | None = None
     channels: tuple[Channel, ...] = field(default=())
+    clocks: tuple[Clock, ...] = ()
 
     def shaft(self, name: str) -> Shaft:
         """Return the shaft called `name`; KeyError lists the shafts that exist."""
@@ -250,6 +267,10 @@ class Drive:
             if motor.name == name:
                 return motor
         raise KeyError(f"no motor '{name}'; there are {', '.join(motor.name for motor in self.motors)}")
+
+    def clock_of(self, channel: Channel) -> Clock | None:
+        """Return the clock of its own that stamps a channel; None where that is the clock of the recording."""
+        return next((clock for clock in self.clocks if clock.name == channel.clock), None)
 
     @property
     def inputs(self) -> tuple[Channel, ...]:

@@ -14,6 +14,7 @@ import casadi as ca
 
 from friction_ocp.drive.control import apply_tick, compute_tick
 from friction_ocp.drive.coordinates import group_angles, group_speeds, pick
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import (
@@ -226,9 +227,15 @@ def _observed_lags(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
 
 
 def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
-    """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives."""
+    """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives.
+
+    What a clock of its own is fast by is a delay, too.
+    """
     value, rate, curvature = _signal(mech, channel, at, acceleration)
-    delayed = value - channel.delay * rate + 0.5 * channel.delay**2 * curvature
+    delay, clock = channel.delay, mech.drive.clock_of(channel)
+    if clock is not None:
+        delay = delay + clock.offset + clock.drift * mech.inputs[TIME]
+    delayed = value - delay * rate + 0.5 * delay**2 * curvature
     return channel.gain * delayed + channel.offset
 
 

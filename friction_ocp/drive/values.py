@@ -22,6 +22,8 @@ def drive_leaves(drive: Drive) -> Iterator[Leaf]:
         yield from leaves(drive.controller, "controller")
     for channel in drive.channels:
         yield from leaves(channel, channel.name, _motion_of(drive, channel.part))
+    for clock in drive.clocks:
+        yield from leaves(clock, clock.path)
 
 
 def _motion_of(drive: Drive, part: str) -> str:
@@ -40,4 +42,5 @@ def bind_drive(drive: Drive, values: Mapping[str, Any]) -> Drive:
         motors=tuple(bind(motor, motor.name, values) for motor in drive.motors),
         controller=None if drive.controller is None else bind(drive.controller, "controller", values),
         channels=tuple(bind(channel, channel.name, values) for channel in drive.channels),
+        clocks=tuple(bind(clock, clock.path, values) for clock in drive.clocks),
     )

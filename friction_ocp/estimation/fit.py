@@ -19,6 +19,7 @@ from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS
 from friction_ocp.estimation.starts import start_points
+from friction_ocp.estimation.synchronise import synchronised
 
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
@@ -45,12 +46,12 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 
 
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
-    """Fit, with the torque noise where it is asked for, then shorten the integrator's steps as far as it matters.
+    """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
 
-    Return the model with these levels and steps.
+    Return the model with these stamps, levels and steps.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
-    fitted = fit(model, progress)
+    model, fitted = synchronised(model, fit(model, progress), phases)
     if model.problem.estimation.estimated_noise and model.train:
         model, fitted = weighed(model, fitted, phases)
     return refined(model, fitted, phases)

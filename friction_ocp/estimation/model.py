@@ -14,6 +14,7 @@ from friction_ocp.drive.steady import steady_speeds
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.clocks import on_one_clock
 from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
@@ -81,6 +82,7 @@ class Model:
 
 def prepare(problem: Problem) -> Model:
     """Build model functions, grids and scales; raises FrictionOcpError where recordings do not fit the drive."""
+    problem = on_one_clock(problem)
     drive = stepped(problem.drive)
     space = parameter_space(problem, drive.parameter_names)
     sweep = Sweep(drive, space.active)

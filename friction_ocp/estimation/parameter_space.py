@@ -135,7 +135,12 @@ def _table(
         else:
             table[path] = value
     table |= {name: symbol for name, symbol in symbols.items() if name not in table}
-    return resolve_ties(ties, table)
+    resolved = resolve_ties(ties, table)
+    if isinstance(use, RecordingUse):  # stamps that were moved already leave the rest to the model
+        for clock, gone in use.moved.items():
+            for key, amount in zip(("offset", "drift"), gone, strict=True):
+                resolved[f"clocks.{clock}.{key}"] = resolved[f"clocks.{clock}.{key}"] - amount
+    return resolved
 
 
 def nested_space(problem: Problem, space: ParameterSpace) -> ParameterSpace:

@@ -26,6 +26,10 @@ class RecordingUse:
     """Values by parameter path, in SI units."""
     place: str = ""
     """Where the problem file names it, such as recordings.train[0]."""
+    moved: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    """By clock: offset, s, and drift that the stamps of its channels were relieved of."""
+    original: Recording | None = None
+    """The recording with its stamps as they were, where they were moved."""
 
     @property
     def name(self) -> str:

@@ -73,6 +73,7 @@ def _fitted_numbers(content: dict[str, Any], section: ProblemSection) -> Iterato
         *zip((motor.name for motor in drive.motors), motors, strict=True),
         *content["channels"].items(),
         ("controller", content.get("controller") or parts.get("controller")),
+        *((f"clocks.{name}", content["clocks"][name]) for name in section.clocks),
     ]
     for name, node in named:
         for keys, number in _with_guess(node, ()):

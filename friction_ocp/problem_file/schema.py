@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -10,6 +11,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from friction_ocp.drive.parts import (
     Channel,
+    Clock,
     Controller,
     ControllerType,
     Drive,
@@ -186,6 +188,14 @@ class DriveSection(Section):
         )
 
 
+class ClockSection(Section):
+    offset: Number = 0.0
+    drift: Number = 0.0
+
+    def build(self, name: str) -> Clock:
+        return Clock(name, **given(self, *self.keys()))
+
+
 class ChannelSection(Section):
     measures: str
     role: Role | None = None
@@ -196,6 +206,7 @@ class ChannelSection(Section):
     noise_std: Positive | None = None
     hold: Hold = "linear"
     eccentricity: EccentricityTerm = None
+    clock: str = ""
 
     def build(self, name: str) -> Channel:
         """Return the channel; without a role it is an output, or an input where nothing could predict it."""
@@ -269,6 +280,7 @@ class ProblemSection(Section):
     title: str = ""
     drive: DriveSection
     channels: dict[ChannelName, ChannelSection]
+    clocks: dict[PartName, ClockSection] = Field(default_factory=dict[str, ClockSection])
     controller: ControllerSection | None = None
     recordings: RecordingsSection
     estimation: EstimationSection = EstimationSection()
@@ -299,4 +311,5 @@ class ProblemSection(Section):
     def build_drive(self) -> Drive:
         """Return the drive with its channels and its controller."""
         channels = tuple(item.build(name) for name, item in self.channels.items())
-        return self.drive.build(channels, self.controller)
+        clocks = tuple(item.build(name) for name, item in self.clocks.items())
+        return replace(self.drive.build(channels, self.controller), clocks=clocks)

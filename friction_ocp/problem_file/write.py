@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from friction_ocp.drive.parts import Channel, Drive, Shaft, Transmission
+from friction_ocp.drive.parts import Channel, Clock, Drive, Shaft, Transmission
 from friction_ocp.friction.composite import Bristled, added_terms, plain_law
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.static import NoFriction
@@ -17,7 +17,7 @@ from friction_ocp.problem_file.document import dump_document, read_document
 from friction_ocp.problem_file.dump import rewrite_recordings
 from friction_ocp.problem_file.salvage import copy_content
 
-_APART = ("drive", "controller", "channels")
+_APART = ("drive", "controller", "channels", "clocks")
 
 
 def write_problem(
@@ -62,6 +62,8 @@ def drive_content(drive: Drive, values: Mapping[str, float] = {}) -> dict[str, A
     if drive.controller is not None:
         content["controller"] = _part(drive.controller, "controller", values)
     content["channels"] = {item.name: _channel(item, values) for item in drive.channels}
+    if drive.clocks:
+        content["clocks"] = {item.name: _clock(item, values) for item in drive.clocks}
     return content
 
 
@@ -97,6 +99,12 @@ def _channel(item: Channel, values: Mapping[str, float]) -> dict[str, Any]:
     section = _part(item, item.name, values)
     section.pop("name")
     return {**section, "role": item.role}
+
+
+def _clock(item: Clock, values: Mapping[str, float]) -> dict[str, Any]:
+    section = _part(item, item.path, values)
+    section.pop("name")
+    return section
 
 
 def _part(part: Any, path: str, values: Mapping[str, float]) -> dict[str, Any]:

@@ -104,8 +104,12 @@ def sweep_maps(drive: SteppedDrive, active: Sequence[int]) -> dict[str, SweepMap
 
 
 def delay_indices(drive: SteppedDrive) -> tuple[int, ...]:
-    """Return where the parameters hold the delays of output channels."""
+    """Return where the parameters hold the delays of output channels, and what their clocks are fast by."""
+    whole = drive.mechanism.drive
     names = {f"{name}.delay" for name in drive.output_names}
+    names |= {
+        f"{clock.path}.{key}" for clock in map(whole.clock_of, whole.outputs) if clock for key in ("offset", "drift")
+    }
     return tuple(k for k, name in enumerate(drive.parameter_names) if name in names)
 
 

@@ -114,7 +114,11 @@ def _aligned(outcomes: list[Outcome], workshop: Workshop, execution: Execution) 
 
 
 def _alike(end: Optimum | None, best: Optimum) -> bool:
-    return end is not None and (end.max_step, end.noise_levels) == (best.max_step, best.noise_levels)
+    return end is not None and (end.max_step, end.noise_levels, end.moves) == (
+        best.max_step,
+        best.noise_levels,
+        best.moves,
+    )
 
 
 def _end(start: FloatArray, outcome: Outcome) -> StartEnd:

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.estimation.clocks import Moves
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.noise_level import with_levels
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.rounds import Fitted, program_builder
+from friction_ocp.estimation.synchronise import moves_of, with_moves
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 LOSSES: Mapping[str, type[AbstractLoss]] = {loss.__name__: loss for loss in (Absolute, Huber, Squares, StudentT)}
@@ -30,15 +32,17 @@ class Optimum:
     """Longest integrator step that it was found with, s."""
     noise_levels: tuple[NoiseLevel, ...] = ()
     """Torque noise that was estimated."""
+    moves: Moves = dataclasses.field(default_factory=dict[str, dict[str, tuple[float, float]]])
+    """By how much stamps were moved."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
         """Take the end of a fit, and what of its model was settled on the way, without its program."""
-        return cls(fitted.solution, fitted.program.loss, model.max_step, model.noise_levels)
+        return cls(fitted.solution, fitted.program.loss, model.max_step, model.noise_levels, moves_of(model))
 
     def settled(self, model: Model) -> Model:
         """Return the model with the integrator steps and the torque noise that the fit ended with."""
-        return with_levels(with_step(model, self.max_step), self.noise_levels)
+        return with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
 
     def fitted(self, model: Model) -> Fitted:
         """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
@@ -56,6 +60,7 @@ class Optimum:
             },
             "objective": float(objective) if np.isfinite(objective) else None,
             "max_step": self.max_step,
+            "moves": {name: {clock: list(fast) for clock, fast in item.items()} for name, item in self.moves.items()},
             "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
@@ -71,7 +76,12 @@ class Optimum:
         numbers = dict(content["loss"])
         loss = LOSSES[numbers.pop("name")](**numbers)
         levels = tuple(_level(item) for item in content["noise_levels"])
-        return cls(Solution(point=point, objective=objective, **facts), loss, float(content["max_step"]), levels)
+        moves = {
+            name: {clock: (float(fast[0]), float(fast[1])) for clock, fast in item.items()}
+            for name, item in content["moves"].items()
+        }
+        solution = Solution(point=point, objective=objective, **facts)
+        return cls(solution, loss, float(content["max_step"]), levels, moves)
 
 
 def _plain(level: NoiseLevel) -> dict[str, Any]:

@@ -264,7 +264,7 @@ def odrive(kind: str, folder: Path) -> Path | None:
     document = {
         "drive": {
             "motor": {"name": "motor", "torque_constant": 3e-3 / 0.4},
-            "shafts": [{"name": "motor", "inertia": guessed(2.5e-4), "friction": law}],
+            "shafts": [{"name": "motor", "inertia": 2.5e-4, "friction": law}],
         },
         "channels": {
             "current": {"measures": "motor.current", "role": "input"},

@@ -10,6 +10,7 @@ import pytest
 from axes import COULOMB, ENCODER_NOISE, INERTIA, RATE, SECONDS, TORQUE_CONSTANT, TRUTH, VISCOUS, fitted_axis
 from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, steps_and_multisine
 
+from friction_ocp.drive.parts import Clock
 from friction_ocp.estimation.estimate import Estimate, identify
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.parameters import Free
@@ -89,3 +90,51 @@ def test_stamps_that_are_wrong_are_noise() -> None:
     estimate = identify(fitted_axis(run(1, stamp_error=0.2 / RATE)))
     assert machine_is_right(estimate)
     assert estimate.simulation.train_errors["position"][0].noise_ratio > 1.2
+
+
+def foreign(seed: int, offset: float, drift: float) -> Recording:
+    """Return a run whose encoder is stamped by another computer's clock."""
+    recording = run(seed)
+    position = recording.channels["position"]
+    stamps = position.time + offset + drift * position.time
+    return replace(recording, channels={**recording.channels, "position": replace(position, time=stamps)})
+
+
+def clocked(*recordings: Recording, guess: float = 0.0, **free: Any) -> Problem:
+    """Return the problem with offset and drift of the encoder's clock as parameters."""
+    plain = fitted_axis(*recordings)
+    current, position = plain.drive.channels
+    clock = Clock("logger", Free(guess, -0.5, 0.5, **free), Free(0.0, -0.05, 0.05))
+    drive = replace(plain.drive, channels=(current, replace(position, clock="logger")), clocks=(clock,))
+    return replace(plain, drive=drive)
+
+
+@pytest.mark.parametrize(("offset", "drift", "guess"), [(0.008, 2e-3, 0.0), (-0.012, 5e-3, 0.0), (0.26, 1e-3, 0.25)])
+def test_offset_and_drift_of_a_clock_are_found(offset: float, drift: float, guess: float) -> None:
+    """A logger's clock that is off and runs fast is found beside the machine, however far the guess moved stamps."""
+    estimate = identify(clocked(foreign(1, offset, drift), guess=guess))
+    assert estimate.converged and machine_is_right(estimate)
+    found = {item.name: item for item in estimate.parameters}
+    for name, truth in (("clocks.logger.offset", offset), ("clocks.logger.drift", drift)):
+        item = found[name]
+        assert abs(item.value - truth) < FAR * item.std_error
+    assert found["clocks.logger.offset"].std_error < SECOND_ORDER
+    assert found["clocks.logger.offset"].unit == "s"
+    assert estimate.simulation.train_errors["position"][0].noise_ratio == pytest.approx(1.0, abs=0.1)
+
+
+def test_each_recording_may_begin_on_its_own_clock() -> None:
+    """The offset may differ from run to run while the drift is the clock's."""
+    runs = foreign(1, 0.004, 2e-3), foreign(2, -0.009, 2e-3)
+    estimate = identify(clocked(*runs, scope="recording"))
+    assert machine_is_right(estimate)
+    assert estimate.values["clocks.logger.offset@run1"] == pytest.approx(0.004, abs=2 * SECOND_ORDER)
+    assert estimate.values["clocks.logger.offset@run2"] == pytest.approx(-0.009, abs=2 * SECOND_ORDER)
+
+
+def test_a_clock_that_is_known_costs_nothing() -> None:
+    """Stated numbers move the stamps, of inputs and outputs, and the fit is that of the true stamps."""
+    true, late = fitted_axis(run(1)), clocked(foreign(1, 0.03, 1e-3))
+    known = replace(late, drive=replace(late.drive, clocks=(Clock("logger", 0.03, 1e-3),)))
+    expected, found = identify(true), identify(known)
+    assert dict(found.values) == pytest.approx(dict(expected.values), rel=1e-6)

@@ -108,6 +108,17 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
 }
 
 MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "unknown clock": (
+        put("channels/position/clock", "loger"),
+        "channels.position.clock: unknown clock 'loger'; describe it in clocks",
+    ),
+    "fitted clock of an input": (
+        several(
+            put("channels/current/clock", "logger"),
+            put("clocks", {"logger": {"offset": {"guess": 0.0, "min": -0.1, "max": 0.1}}}),
+        ),
+        "clocks.logger.offset: current is an input, and its clock cannot be fitted; a number; fit the clock of the",
+    ),
     "noise that is no level": (
         put("estimation", {"process_noise": {"load": "often"}}),
         "estimation.process_noise.load: this is 'often'; a number >= 0, estimate, or {guess: ...}",

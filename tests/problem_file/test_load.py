@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from problem_workshop import Workshop
 
+from friction_ocp.drive.parts import Clock
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.static import Polyline
 from friction_ocp.parameters import Free, Tie
 from friction_ocp.problem_file.check import check
+from friction_ocp.problem_file.dump import dump_problem
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.problem_file.write import write_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -79,6 +82,24 @@ def test_example_of_the_interface_is_read(tmp_path: Path) -> None:
     assert problem.train[1].set == {"motor.torque_constant": 0.36}
     assert problem.estimation.fit == "simulation"
     assert check(problem) == ()
+
+
+def test_clocks_of_loggers_are_read(workshop: Workshop) -> None:
+    """A clock has an offset and a drift, known or fitted, and stamps the channels that name it."""
+
+    def spoil(content: dict[str, Any]) -> None:
+        content["channels"]["position"]["clock"] = "logger"
+        content["clocks"] = {"logger": {"offset": {"guess": 0.01, "min": -1, "max": 1}}}
+
+    path = workshop.problem(spoil)
+    problem = load_problem(path)
+    assert problem.drive.clocks == (Clock("logger", Free(0.01, -1.0, 1.0), 0.0),)
+    assert problem.drive.clock_of(problem.drive.outputs[0]) == problem.drive.clocks[0]
+    assert check(problem) == ()
+    again = dump_problem(path, {"clocks.logger.offset": 0.02}, path.parent)
+    assert "guess: 0.02" in again
+    written = write_problem(path, problem.drive, {"clocks.logger.offset": 0.03}, path.parent)
+    assert "clock: logger" in written and "guess: 0.03" in written
 
 
 def test_torque_noise_is_known_or_estimated(workshop: Workshop) -> None:

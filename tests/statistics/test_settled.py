@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from runs import HERE, right_problem
 from stiff_axis import stiff_problem
+from test_clocks import clocked, foreign
 
 from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.fit import settled
@@ -52,3 +53,13 @@ def test_torque_noise_goes_with_the_optimum() -> None:
     assert again.process_noise == pytest.approx(dict(model.process_noise))
     program = kept.fitted(again).program
     assert program.objective(kept.solution.point) == pytest.approx(fitted.solution.objective)
+
+
+def test_moved_stamps_go_with_the_optimum() -> None:
+    """The optimum remembers where identify moved the stamps of a clock, through a file, and goes on from there."""
+    problem = clocked(foreign(1, 0.008, 2e-3))
+    model, fitted = settled(prepare_fit(problem))
+    kept = Optimum.read(json.loads(json.dumps(Optimum.of(model, fitted).document(), allow_nan=False)))
+    assert kept.moves["run1"]["logger"] != (0.0, 0.0)
+    again = kept.settled(prepare_fit(problem))
+    assert kept.fitted(again).program.objective(kept.solution.point) == pytest.approx(fitted.solution.objective)

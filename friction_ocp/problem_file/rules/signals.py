@@ -203,6 +203,27 @@ def delays_of_inputs_are_known(case: Case) -> Iterator[Finding]:
             )
 
 
+def clocks_exist(case: Case) -> Iterator[Finding]:
+    """A channel is stamped by a clock that the file describes."""
+    names = [clock.name for clock in case.drive.clocks]
+    for channel in case.drive.channels:
+        if channel.clock and channel.clock not in names:
+            where = case.at(f"channels.{channel.name}.clock")
+            there = f"there are {', '.join(names)}" if names else "describe it in clocks"
+            yield Finding(where, f"unknown clock '{channel.clock}'", there, closest(channel.clock, names))
+
+
+def clocks_of_inputs_are_known(case: Case) -> Iterator[Finding]:
+    """The stamps of an input are moved before the fit; what is to be found is the clock of the outputs against it."""
+    for channel in case.drive.inputs:
+        clock = case.drive.clock_of(channel)
+        for key in ("offset", "drift") if clock else ():
+            if not isinstance(getattr(clock, key), (int, float)):
+                what = f"{channel.name} is an input, and its clock cannot be fitted"
+                remedy = "fit the clock of the outputs instead: it is what differs"
+                yield Finding(case.at(f"clocks.{channel.clock}.{key}"), what, "a number", remedy)
+
+
 def delay_needs_a_sample_time(case: Case) -> Iterator[Finding]:
     """Only a sampled controller can be late."""
     controller = case.drive.controller
@@ -232,6 +253,8 @@ SIGNALS: tuple[Rule, ...] = (
     inputs_are_single,
     motors_are_driven_once,
     delays_of_inputs_are_known,
+    clocks_exist,
+    clocks_of_inputs_are_known,
     delay_needs_a_sample_time,
     process_noise_acts_on_shafts,
 )

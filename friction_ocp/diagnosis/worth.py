@@ -1,0 +1,93 @@
+"""What a candidate must promise to be refitted, and what an addition must explain to be an effect of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.free_gap import free_errors
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.diagnosis.select import Rival
+from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.registry import candidates
+
+REFITTED = 6
+"""Candidates that are refitted in a round."""
+WORTH_REFITTING = 0.1
+"""Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
+MATERIAL = 0.1
+"""Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
+OF_ALL, OF_REST = 0.1, 0.4
+"""Share of the excess that the base model left, or of what is left, that an addition must explain, one or the other: a
+law of another shape than the machine's leaves up to a fifth of its own effect, which is no further effect; of two
+effects of one size each explains half, and of that the same four fifths."""
+
+Key = tuple[str, str]
+"""Effect and component."""
+
+
+def places(current: FittedModel, names: list[str]) -> list[Key]:
+    """Return effects and places; static points also show friction of shafts whose motion an input prescribes."""
+    drive = current.model.problem.drive
+    found = [(effect.name, place) for effect, place in candidates(drive, names)]
+    driven = prescribed(drive)
+    if not current.model.static or not driven:
+        return found
+    channels = tuple(replace(item, role="output") if item.part in driven else item for item in drive.channels)
+    free = candidates(replace(drive, channels=channels), names)
+    return list(dict.fromkeys([*found, *((effect.name, place) for effect, place in free if place in driven)]))
+
+
+def prescribed(drive: Drive) -> set[str]:
+    """Return the shafts whose motion is an input."""
+    return {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
+
+
+def shortlist(found: Sequence[Screened], limit: float, large: float = np.inf) -> list[Screened]:
+    """Return candidates that are worth a refit.
+
+    Where there is a gap for certain, a mere sign of significance is enough as the limit, or a `large` predicted gain,
+    which may come from a few blocks alone: the decision is made on recordings left out. Otherwise the limit is
+    corrected for the number of candidates (Bonferroni). Places compete: an effect that is worth it at one of them is
+    refitted at the others, too.
+    """
+    significant = [item for item in found if (item.p_value < limit or item.gain >= large) and item.gain > 0]
+    if not significant:
+        return []
+    worth = WORTH_REFITTING * significant[0].gain
+    named = {item.effect for item in significant if item.gain >= worth}
+    return [item for item in found if item.effect in named and item.gain >= worth][:REFITTED]
+
+
+def required(base: FittedModel, current: FittedModel) -> float:
+    """Return the decrease of the objective that makes an addition an effect of its own."""
+    whole, rest = (max(item.objective - 0.5 * samples(item), 0.0) for item in (base, current))
+    return min(OF_ALL * whole, OF_REST * rest)
+
+
+def samples(fitted: FittedModel) -> int:
+    """Return the number of samples that an objective counts."""
+    rows = fitted.linear.rows
+    return int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
+
+
+def gain(current: FittedModel, rival: Rival) -> float:
+    """Return what a rival gains for certain: held out, but no more than where it was fitted."""
+    return min(float(np.sum(rival.gains)), current.objective - rival.fitted.objective)
+
+
+def is_material(current: FittedModel, fitted: FittedModel) -> bool:
+    """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points."""
+    before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
+    pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
+    return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
+
+
+def _static_excess(fitted: FittedModel) -> float:
+    """Return the mean square of static points' errors over their standard errors, beyond 1."""
+    rows = fitted.linear.rows
+    own = np.isin(rows.recording, rows.static)
+    return max(0.0, float(np.mean(rows.residual[own] ** 2)) - 1.0) if np.any(own) else 0.0

@@ -1,0 +1,79 @@
+"""Fits again with stamps moved by what the clocks were found to be fast by, until little is left to expand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.estimation.clocks import Moves, on_one_clock
+from friction_ocp.estimation.model import Model, prepare, with_step
+from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.rounds import Fitted, final_solver, limits, program_builder
+from friction_ocp.simulation.grid import FloatArray
+
+NEAR = 0.1
+"""Sampling intervals that a clock may be off by at a last fit: a delay is expanded to second order only."""
+MOST_TURNS = 8
+
+
+def synchronised(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
+    """Return model and fit with stamps so near that the expansion of the delays is exact."""
+    for turn in range(MOST_TURNS):
+        theta = fitted.solution.point.theta
+        if not _is_fitted(model) or _distance(model, theta) <= NEAR:
+            break
+        model = with_moves(model, _found(model, theta))
+        program = program_builder(model)(model, 0.0, fitted.program.loss)
+        start = Point(model.space.clip(theta), program.suggested_nodes(theta))
+        end = final_solver(model)(program, start, limits(model), phases.begin(f"clocks, turn {turn + 1}"))
+        fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
+    return model, fitted
+
+
+def with_moves(model: Model, moves: Moves) -> Model:
+    """Return a model whose stamps are moved by other amounts; steps, noise and start stay."""
+    if not moves:
+        return model
+    fresh = prepare(on_one_clock(model.problem, moves))
+    moved = replace(with_step(fresh, model.max_step), noise_levels=model.noise_levels)
+    return replace(moved, space=moved.space.moved(model.space.guess))
+
+
+def moves_of(model: Model) -> Moves:
+    """Return by how much the stamps of a model were moved."""
+    return {use.name: use.moved for use in model.problem.recordings if use.moved}
+
+
+def _is_fitted(model: Model) -> bool:
+    return any(model.space.leaf_names[k].startswith("clocks.") for k in model.space.active)
+
+
+def _left(model: Model, theta: FloatArray, recording: str) -> dict[str, tuple[float, float]]:
+    """Return by clock what the model still takes for offset and drift."""
+    numbers = dict(zip(model.space.leaf_names, model.space.numbers(theta, recording), strict=True))
+    clocks = model.problem.drive.clocks
+    return {item.name: (float(numbers[f"{item.path}.offset"]), float(numbers[f"{item.path}.drift"])) for item in clocks}
+
+
+def _found(model: Model, theta: FloatArray) -> Moves:
+    """Return the whole of what the clocks are fast by."""
+    return {
+        use.name: {
+            name: (offset + use.moved[name][0], drift + use.moved[name][1])
+            for name, (offset, drift) in _left(model, theta, use.name).items()
+        }
+        for use in model.problem.recordings
+    }
+
+
+def _distance(model: Model, theta: FloatArray) -> float:
+    """Return the largest delay that is left in the training recordings, in sampling intervals."""
+    largest = 0.0
+    for item in model.train:
+        span = float(item.grid.time[-1] - item.grid.time[0])
+        interval = span / max(int(np.isfinite(item.measured).any(axis=1).sum()), 1)
+        for offset, drift in _left(model, theta, item.name).values():
+            largest = max(largest, max(abs(offset), abs(offset + drift * span)) / interval)
+    return largest
