@@ -128,7 +128,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive.
 
-    Where the inputs, read the other way between their samples, leave less to explain, that is how they are read.
+    Where the inputs, read the other way between their samples, leave nothing with fewer additions, or where something
+    was left, that is how they are read.
     """
     stated, other = _diagnosed(problem, tell, execution), other_reading(problem)
     if other is None or not stated.gap:
@@ -137,7 +138,7 @@ def diagnose(
     if not explains_more(open_bench(other, execution).base, stated.final, stated.accepted, stated.left_over):
         return stated
     read = _diagnosed(other, tell, execution)
-    simpler = (read.left_over, len(read.accepted)) < (stated.left_over, len(stated.accepted))
+    simpler = not read.left_over and (stated.left_over or len(read.accepted) < len(stated.accepted))
     return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
 
 
