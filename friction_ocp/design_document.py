@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from friction_ocp.drive.units import unit_of
+from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.excitation.design import Design, Option
+from friction_ocp.quantities import si_unit
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-design/1"
@@ -25,7 +26,12 @@ def design_document(design: Design) -> dict[str, Any]:
         "criterion": design.criterion,
         "separates": [{"effect": effect, "component": place} for effect, place in design.between],
         "limits": {key: getattr(design.limits, key) for key in ("speed", "torque", "travel")},
+        "limit_units": {
+            key: si_unit(kind, drive.shafts[0].motion)
+            for key, kind in (("speed", "speed"), ("torque", "torque"), ("travel", "angle"))
+        },
         "limits_stated": list(design.limits.stated),
+        "channel_units": {item.name: signal_unit(drive, item.measures) for item in drive.channels},
         "recording": RECORDING if design.options else None,
         "options": [_option(design, item) for item in design.options],
         "parameters": {

@@ -16,12 +16,14 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.select import Rival, probabilities
+from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
 from friction_ocp.excitation.next_experiment import FollowUp
+from friction_ocp.quantities import si_unit
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
@@ -84,7 +86,7 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "components": components or ([] if diagnosis.rest is None else [diagnosis.rest]),
         "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
-        "shape": None if found is None else _curve(found),
+        "shape": None if found is None else _curve(found, diagnosis.problem.drive),
         "map": [
             {
                 "component": cell.component,
@@ -109,10 +111,13 @@ def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:
     return max(shapes, key=lambda found: found.share, default=None)
 
 
-def _curve(found: Shape) -> dict[str, Any]:
+def _curve(found: Shape, drive: Drive) -> dict[str, Any]:
     columns = {"at": found.centre, "torque": found.torque, "lower": found.lower, "upper": found.upper}
     numbers = {key: [number(float(value)) for value in values] for key, values in columns.items()}
-    return {"component": found.component, "variable": found.variable, **numbers}
+    motion, kind = drive.shaft(found.component).motion, found.variable.rpartition(".")[2]
+    of = {"theta": "angle", "omega": "speed", "alpha": "acceleration", "torque": "torque", "time": "time"}.get(kind)
+    units = {"unit": si_unit("torque", motion), "variable_unit": si_unit(of, motion) if of else ""}
+    return {"component": found.component, "variable": found.variable, **units, **numbers}
 
 
 def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
@@ -238,8 +243,10 @@ def _bias(item: Bias) -> dict[str, Any]:
 
 def _assumptions(diagnosis: Diagnosis) -> list[str]:
     foot = diagnosis.base.footing
+    units = _units(diagnosis)
     lines = [
-        f"{name}: noise floor {floor.std:.3g} ({floor.source})" for name, floor in diagnosis.base.model.floors.items()
+        f"{name}: noise floor {floor.std:.3g} {units.get(name, '')} ({floor.source})"
+        for name, floor in diagnosis.base.model.floors.items()
     ]
     lines += [
         f"{shaft}: torque noise {density:.3g} N m/sqrt(Hz), from the measured inputs and what the file states"

@@ -24,37 +24,41 @@ GAINS = (
 
 def diagnosis_figures(result: Json, before: Series, after: Series) -> Iterator[tuple[str, Figure]]:
     """Yield name and figure of whatever the diagnosis has."""
-    cells = rows(part(result, "where"), "map")
+    cells, changed = rows(part(result, "where"), "map"), bool(rows(result, "accepted"))
     if cells:
-        yield "gap-map", gap_map_figure(cells)
+        yield "gap-map", gap_map_figure(cells, changed)
     found = part(result, "where").get("shape")
     if found:
         yield "shape", shape_figure(found, part(result, "where"))
     for k, item in enumerate(rows(result, "rounds")):
-        causes = rows(item, "causes")[:SHOWN]
+        causes = [cause for cause in rows(item, "causes") if cause.get("refit_gain") is not None][:SHOWN]
         if causes:
             yield f"ranking-{k + 1}", ranking_figure(k + 1, causes)
     units = part(result, "channel_units")
     for recording, channels in before.items():
         if channels:
-            yield f"before-after-{recording}", before_after_figure(recording, channels, after[recording], units)
+            shown = after[recording] if changed else None
+            yield f"before-after-{recording}", before_after_figure(recording, channels, shown, units)
 
 
-def gap_map_figure(cells: Sequence[Json]) -> Figure:
-    """Draw rms errors over the noise floor by channel and regime, before and after."""
+def gap_map_figure(cells: Sequence[Json], changed: bool) -> Figure:
+    """Draw rms errors over the noise floor by channel and regime, before and, where anything was added, after."""
     labels = list(dict.fromkeys((str(cell["channel"]), str(cell["regime"])) for cell in cells))
     figure = new_figure(1.2 + 0.32 * len(labels))
     axes = axes_grid(figure, 1)[0][0]
-    for key, colour, shift in (("before", RESIDUAL, 0.19), ("after", MEASURED, -0.19)):
+    bars = (("before", RESIDUAL, -0.19), ("after", MEASURED, 0.19)) if changed else (("before", RESIDUAL, 0.0),)
+    for key, colour, shift in bars:
         sizes = [_rms([float(cell[key]) for cell in cells if (cell["channel"], cell["regime"]) == at]) for at in labels]
         axes.barh(np.arange(len(labels)) + shift, np.maximum(sizes, 1e-3), height=0.36, color=colour, label=key)
-    axes.set_yticks(np.arange(len(labels)), [f"{channel}: {regime}" for channel, regime in labels])
+    names = [f"{channel}: {regime.replace('_', ' ')}" for channel, regime in labels]
+    axes.set_yticks(np.arange(len(labels)), names)
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
     axes.set_title("Where the gap is")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    if changed:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     axes.invert_yaxis()
     return figure
 
@@ -68,9 +72,12 @@ def shape_figure(found: Json, where: Json) -> Figure:
     axes.plot(at, found["torque"], color=MEASURED, marker="o", markersize=3.5, label="missing torque")
     axes.axhline(0.0, color=MUTED, linewidth=1.0)
     share = float(part(where, "depends_on")["share"])
-    axes.set_title(f"What the model lacks at {found['component']}: {found['variable']} explains {share:.0%} of it")
-    axes.set_xlabel(f"{found['variable']} (SI)")
-    axes.set_ylabel("torque or force (SI)")
+    axes.set_title(
+        f"What the model lacks at {found['component']}: {found['variable']} explains {100 * share:.0f} % of it"
+    )
+    unit = unit_text(str(found.get("variable_unit", "")))
+    axes.set_xlabel(f"{found['variable']} in {unit}" if unit else str(found["variable"]))
+    axes.set_ylabel(f"missing torque in {unit_text(str(found.get('unit', 'SI units')))}")
     axes.legend(loc="best")
     return figure
 
@@ -85,31 +92,33 @@ def ranking_figure(number: int, causes: Sequence[Json]) -> Figure:
     axes = axes_grid(figure, 1)[0][0]
     places = np.arange(len(causes))
     for k, (key, label, colour) in enumerate(GAINS):
-        gains = [float(cause.get(key) or 0.0) for cause in causes]
+        gains = [100.0 * float(cause.get(key) or 0.0) for cause in causes]
         axes.barh(places + 0.26 * (k - 1), gains, height=0.24, color=colour, label=label)
-    names = [f"{cause['effect']} at {cause['component']} (p = {float(cause['probability']):.2g})" for cause in causes]
+    names = [f"{str(cause['effect']).replace('_', ' ')} at {cause['component']}" for cause in causes]
     axes.set_yticks(places, names)
-    axes.set_xlabel("share of the excess error that the candidate takes away")
+    axes.set_xlabel("share of the excess error that the candidate takes away, in %")
     axes.set_title(f"What competes, round {number}")
-    axes.legend(loc="best")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     axes.axvline(0.0, color=MUTED, linewidth=1.0)
     axes.invert_yaxis()
     return figure
 
 
 def before_after_figure(
-    recording: str, before: Mapping[str, Any], after: Mapping[str, Any], units: Mapping[str, str]
+    recording: str, before: Mapping[str, Any], after: Mapping[str, Any] | None, units: Mapping[str, str]
 ) -> Figure:
-    """Draw the residuals of every channel before and after the additions."""
+    """Draw the residuals of every channel before and, where there are any, after the additions."""
     figure = new_figure(0.6 + 2.2 * len(before))
     figure.suptitle(f"{recording}: residuals of the free run", x=0.01, ha="left", fontweight="bold", fontsize=12)
     grid = axes_grid(figure, len(before), sharex=True)
     for axes, (name, channel) in zip((row[0] for row in grid), before.items(), strict=True):
-        for label, content, colour in (("before", channel, RESIDUAL), ("after", after[name], MEASURED)):
+        curves = [("before", channel, RESIDUAL)] + ([("after", after[name], MEASURED)] if after is not None else [])
+        for label, content, colour in curves:
             residual = np.asarray(content["measured"]) - np.asarray(content["simulated"])
             axes.plot(content["time"], residual, color=colour, linewidth=0.9, label=label)
         axes.set_title(name)
         axes.set_ylabel(f"residual in {unit_text(units.get(name, ''))}")
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        if after is not None:
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     grid[-1][0].set_xlabel("time in s")
     return figure

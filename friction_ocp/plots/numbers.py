@@ -41,9 +41,16 @@ def to_resolution(value: Any, std_error: Any) -> str:
     return _written(float(value), last)
 
 
-def percent(value: Any) -> str:
-    """Return a fraction as a percentage with 3 significant digits, or a dash."""
-    return f"{significant(100 * value, 3)} %" if is_number(value) else NOTHING
+def percent(value: Any, digits: int = 3) -> str:
+    """Return a fraction as a percentage with `digits` significant digits, or a dash."""
+    return f"{significant(100 * value, digits)} %" if is_number(value) else NOTHING
+
+
+def whole_percent(value: Any) -> str:
+    """Return a fraction as a percentage without decimals, or a dash; what is tiny but not zero is below 1 %."""
+    if not is_number(value):
+        return NOTHING
+    return "< 1 %" if 0.0 < value < 0.005 else f"{100 * value:.0f} %"
 
 
 def unit_text(unit: str) -> str:

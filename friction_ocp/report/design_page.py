@@ -6,11 +6,19 @@ import base64
 from collections.abc import Mapping
 from pathlib import Path
 
-from friction_ocp.plots.numbers import percent, significant
+from friction_ocp.plots.numbers import percent, significant, unit_text
 from friction_ocp.plots.reading import Json, objects, part, rows
-from friction_ocp.report.design_words import design_sentence, limits_sentence
+from friction_ocp.report.design_words import chance, design_sentence, limits_sentence
 from friction_ocp.report.page import paragraphs, render_page
 from friction_ocp.whole_file import write_text
+
+WORTH = {
+    "D": "Worth: gain in the logarithm of the determinant of the information; 1.4 more halves the volume of the "
+    "confidence region.",
+    "A": "Worth: minus the mean of the squared relative standard errors that are left.",
+    "separation": "Worth: squared distance of the rivals in noise floors, once the false one has adapted. Decides: the "
+    "probability that one such recording tells which is true.",
+}
 
 
 def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
@@ -26,6 +34,8 @@ def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -
             "limits": limits_sentence(result),
             "options": [_option(item) for item in rows(result, "options")],
             "parameters": _parameters(result),
+            "decides": bool(rows(result, "separates")),
+            "worth": WORTH.get(str(result.get("criterion")), ""),
             "figures": pictures,
         },
     )
@@ -36,9 +46,9 @@ def _option(item: Json) -> dict[str, str]:
     return {
         "motion": str(item["motion"]).replace("_", " "),
         "sentence": str(item["sentence"]),
-        "amplitude": percent(float(item["amplitude"])),
+        "amplitude": percent(float(item["amplitude"]), 2),
         "worth": "" if item["worth"] is None else significant(float(item["worth"]), 3),
-        "power": "" if item["power"] is None else percent(float(item["power"])),
+        "power": "" if item["power"] is None else chance(float(item["power"])),
     }
 
 
@@ -51,5 +61,5 @@ def _parameters(result: Json) -> list[dict[str, str]]:
         if after.get(name) is not None and item["std_error_before"] is not None:
             numbers = {"value": item["value"], "before": item["std_error_before"], "after": after[name]}
             texts = {key: significant(float(number), 3) for key, number in numbers.items()}
-            found.append({"name": name, "unit": str(item["unit"]), **texts})
+            found.append({"name": name, "unit": unit_text(str(item["unit"])), **texts})
     return found

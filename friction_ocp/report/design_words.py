@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from friction_ocp.plots.numbers import percent, significant
+from friction_ocp.plots.numbers import percent, significant, unit_text
 from friction_ocp.plots.reading import Json, objects, part, rows
 
 
@@ -12,13 +12,18 @@ def design_sentence(result: Json) -> str:
     if not options:
         return "No motion keeps the limits, or none could be simulated: widen the limits."
     best = options[0]
-    what = f"Record {best['sentence']}, up to {percent(float(best['amplitude']))} of the allowed speed"
+    share = float(best["amplitude"])
+    what = f"Record {best['sentence']}" + (f", at {percent(share, 2)} of their size" if share < 0.995 else "")
     rivals = rows(result, "separates")
     if rivals:
-        named = " and ".join(f"{item['effect']} at {item['component']}" for item in rivals)
-        power = percent(float(best["power"] or 0.0))
-        return f"{what}: it decides between {named} with a probability of {power}."
+        named = " and ".join(f"{str(item['effect']).replace('_', ' ')} at {item['component']}" for item in rivals)
+        return f"{what}: it decides between {named} with a probability of {chance(best['power'] or 0.0)}."
     return f"{what}: {_sharpest(result, best)}."
+
+
+def chance(power: float) -> str:
+    """Return a probability as a percentage, never as certainty."""
+    return "over 99.9 %" if power > 0.999 else percent(power, 2)
 
 
 def _sharpest(result: Json, best: Json) -> str:
@@ -37,11 +42,13 @@ def _sharpest(result: Json, best: Json) -> str:
 def limits_sentence(result: Json) -> str:
     """Say within which limits, and where they come from."""
     stated = set(rows(result, "limits_stated"))
+    units = part(result, "limit_units")
     parts = [
-        f"{key} {significant(float(value), 3)} ({'stated' if key in stated else 'reached in the recordings'})"
+        f"{key} {significant(float(value), 3)} {unit_text(str(units.get(key, '')))} "
+        f"({'stated' if key in stated else 'reached in the recordings'})"
         for key, value in part(result, "limits").items()
     ]
-    return f"Limits at the first shaft, SI units: {', '.join(parts)}."
+    return f"Limits at the first shaft: {', '.join(parts)}."
 
 
 def design_summary(result: Json) -> str:

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.plots.numbers import plain, significant, unit_text
+from friction_ocp.plots.numbers import NOTHING, plain, significant, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.diagnosis_words import alias_sentences, bias_sentences, diagnosis_sentence, round_sentence
 from friction_ocp.report.page import paragraphs, render_page
 from friction_ocp.whole_file import write_text
 
-LISTED = 10
-"""Candidates in the table of a round."""
+LISTED = 6
+"""Candidates that are listed at least in the table of a round."""
 
 
 def write_diagnosis_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
@@ -30,7 +30,8 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
         if name not in figures:
             return Markup("")
         data = base64.b64encode(figures[name].read_bytes()).decode()
-        return Markup('<p><img alt="{}" src="data:image/png;base64,{}"></p>').format(name, data)
+        picture = '<div class="scroll" role="region" aria-label="{0}" tabindex="0"><img alt="{0}" src="{1}"></div>'
+        return Markup(picture).format(name, f"data:image/png;base64,{data}")
 
     gap, following = part(result, "gap"), result.get("next_experiment")
     return render_page(
@@ -42,6 +43,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "sentence": diagnosis_sentence(result),
             "evaluated_on": rows(gap, "evaluated_on"),
             "horizon": plain(gap["horizon_s"]) if gap.get("horizon_s") is not None else "",
+            "changed": bool(rows(result, "accepted")),
             "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
             "rounds": [_round(item) for item in rows(result, "rounds")],
             "aliases": alias_sentences(result),
@@ -68,21 +70,32 @@ def _gap_row(name: str, gap: Json) -> dict[str, str]:
 
 
 def _round(item: Json) -> dict[str, Any]:
-    return {"sentence": round_sentence(item), "causes": [_cause(cause) for cause in rows(item, "causes")[:LISTED]]}
+    """Return what a round decided, all candidates that were refitted and the most promising others."""
+    causes = rows(item, "causes")
+    refitted = sum(cause.get("refit_gain") is not None for cause in causes)
+    listed = max(refitted, LISTED)
+    return {
+        "sentence": round_sentence(item),
+        "refitted": bool(refitted),
+        "causes": [_cause(cause) for cause in causes[:listed]],
+        "others": max(len(causes) - listed, 0),
+    }
 
 
 def _cause(cause: Json) -> dict[str, str]:
-    values = part(cause, "parameters")
+    refitted = cause.get("refit_gain") is not None
+    values = part(cause, "parameters").items() if refitted else ()
     return {
         "effect": str(cause["effect"]).replace("_", " "),
         "component": str(cause["component"]),
-        "probability": significant(cause["probability"], 2),
+        "probability": whole_percent(cause["probability"]) if refitted else NOTHING,
+        "p_value": significant(cause.get("p_value"), 2),
         "predicted": _gain(cause.get("predicted_gain")),
         "refit": _gain(cause.get("refit_gain")),
         "heldout": _gain(cause.get("heldout_gain")),
-        "parameters": ", ".join(f"{name} = {significant(value, 4)}" for name, value in values.items()),
+        "parameters": ", ".join(f"{name} = {significant(value, 3)}" for name, value in values),
     }
 
 
 def _gain(value: float | None) -> str:
-    return "" if value is None else f"{value:.1%}"
+    return NOTHING if value is None else f"{100 * value:.0f} %"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friction_ocp.plots.numbers import percent, significant, unit_text
+from friction_ocp.plots.numbers import percent, significant, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, part, rows
 
 
@@ -30,13 +30,14 @@ def diagnosis_sentence(result: Json) -> str:
 def round_sentence(item: Json) -> str:
     """Say what a round decided and how sure it is."""
     chances = part(item, "probabilities")
-    rest = (
-        f"no effect {float(chances['no_effect']):.2g}, outside the catalogue {float(chances['outside_catalogue']):.2g}"
-    )
+    none, outside = (whole_percent(chances[key]) for key in ("no_effect", "outside_catalogue"))
     accepted = part(item, "accepted")
-    decided = f"Added: {_named(accepted)}." if accepted else "Nothing was added."
-    power = float(part(item, "excess")["ratio"])
-    return f"{decided} Power of the innovations over the noise before it: {power:.3g}. Probabilities: {rest}."
+    decided, when = (f"Added: {_named(accepted)}.", "Before it") if accepted else ("Nothing was added.", "So far")
+    power = significant(part(item, "excess")["ratio"], 2)
+    return (
+        f"{decided} {when} the errors of one-step predictions have {power} times the power of their noise. "
+        f"Probability that nothing is missing: {none}; that the cause is outside the catalogue: {outside}."
+    )
 
 
 def alias_sentences(result: Json) -> list[str]:
@@ -50,10 +51,11 @@ def bias_sentences(result: Json) -> list[str]:
     for item in rows(result, "biased_parameters"):
         before, after = float(item["before"]), float(item["after"])
         unit = unit_text(str(item.get("unit", "")))
-        off = (
-            f", {abs(before / after - 1.0):.0%} too {'high' if before > after else 'low'}" if after * before > 0 else ""
-        )
-        lines.append(f"{item['name']}: {significant(before, 4)} before, {significant(after, 4)} {unit} after{off}")
+        off = ""
+        if after * before > 0:
+            off = f", {100 * abs(before / after - 1.0):.0f} % too {'high' if before > after else 'low'}"
+        sizes = f"{significant(before, 3)} {unit} before, {significant(after, 3)} {unit} after"
+        lines.append(f"{item['name']}: {sizes}{off}")
     return lines
 
 
@@ -63,7 +65,7 @@ def diagnosis_summary(result: Json) -> str:
     for number, item in enumerate(rows(result, "rounds"), 1):
         lines.append(f"round {number}: {round_sentence(item)}")
         for cause in rows(item, "causes")[:3]:
-            lines.append(f"  {_named(cause)}: probability {float(cause['probability']):.2g}")
+            lines.append(f"  {_named(cause)}: probability {whole_percent(cause['probability'])}")
     lines += [f"cannot be told apart: {line}" for line in alias_sentences(result)]
     lines += [f"biased before: {line}" for line in bias_sentences(result)]
     following = result.get("next_experiment")
@@ -77,12 +79,12 @@ def _named(item: Json) -> str:
 def _closed(closed: Json) -> str:
     """Say how much of the gap is gone where the candidate was not fitted, and when that is nothing to rely on."""
     overall, ends = float(closed["overall"]), [float(end) for end in closed["interval95"]]
-    low, high = (percent(end) for end in ends)
+    low, high = (percent(end, 2) for end in ends)
     if ends[1] < 0.0:
-        grown = f"{percent(-overall)} ({percent(-ends[1])} to {percent(-ends[0])})"
+        grown = f"{percent(-overall, 2)} ({percent(-ends[1], 2)} to {percent(-ends[0], 2)})"
         return f"the excess error on recordings left out grows by {grown}: do not rely on it"
     doubt = "" if ends[0] > 0.0 else ", not certainly any"
-    return f"{percent(overall)} of the excess error is gone ({low} to {high}{doubt})"
+    return f"{percent(overall, 2)} of the excess error is gone ({low} to {high}{doubt})"
 
 
 def _listed(items: Sequence[str]) -> str:

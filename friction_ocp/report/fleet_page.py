@@ -61,7 +61,7 @@ def _test(item: Json) -> Sequence[Cell]:
         Cell(str(item["parameter"]), str(item["parameter"])),
         Cell("drifts" if item["flagged"] else "steady", str(not item["flagged"])),
         Cell(significant(item["adjusted_p_value"], 2), float(item["adjusted_p_value"])),
-        Cell(percent(item["relative"]), change),
+        Cell(percent(item["relative"], 2), change),
         Cell(f"{item['shape']} after {when_text(item)}", str(item["shape"])),
     )
 

@@ -13,7 +13,7 @@ _MOST = 8
 def fleet_sentence(result: Json) -> str:
     """Say what changed in one sentence or two."""
     moving, out = flagged(result), rows(result, "outliers")
-    rate = percent(result["false_alarm_rate"])
+    rate = f"{100 * result['false_alarm_rate']:g} %"
     count = len(part(result, "machines"))
     machines = f"{count} machine{'s' * (count != 1)}"
     tail = f"In a fleet in which nothing changes, anything is flagged with a probability of {rate} at most."
@@ -41,11 +41,11 @@ def drift_sentence(item: Json) -> str:
     when = when_text(item)
     relative = item["relative"]
     ends = item["interval95"]
-    by = significant(item["change"], 3) if relative is None else percent(relative)
+    by = significant(item["change"], 2) if relative is None else percent(relative, 2)
     between = ""
     if ends and relative is not None:
         low, high = sorted(end / abs(item["before"]) for end in ends)
-        between = f" ({percent(low)} to {percent(high)})"
+        between = f" ({percent(low, 2)} to {percent(high, 2)})"
     way = "jumps" if item["shape"] == "step" else "moves steadily"
     return f"{item['machine']}: {item['parameter']} {way} by {by}{between} of {size} after {when}"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from friction_ocp.plots import palette
-from friction_ocp.plots.numbers import plain
+from friction_ocp.plots.numbers import plain, significant
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.report.compensation import compensation_section
@@ -129,15 +129,30 @@ def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
     ]
 
 
+_FACTS = {
+    "code": "code, SHA-256",
+    "model": "model, SHA-256",
+    "seconds": "seconds, fit",
+    "build_seconds": "seconds, build",
+}
+
+
 def facts(found: Json) -> dict[str, str]:
-    """Return names and values as a person reads them."""
-    return {str(key).replace("_", " "): _fact(value) for key, value in found.items()}
+    """Return names and values as a person reads them, without what is not stated."""
+    told = {_FACTS.get(str(key), str(key).replace("_", " ")): _fact(value) for key, value in found.items()}
+    return {key: text for key, text in told.items() if text}
 
 
 def _fact(value: Any) -> str:
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} {_fact(item)}" for key, item in cast("Json", value).items())
-    return plain(value) if isinstance(value, float) else str(value)
+        content = cast("Json", value)
+        if "name" in content:
+            return f"{content['name']} {_fact(content.get('options'))}".rstrip()
+        told = {key.replace("_", " "): _fact(item) for key, item in content.items()}
+        return ", ".join(f"{key} {text}" for key, text in told.items() if text)
+    if value is None:
+        return ""
+    return significant(value, 3) if isinstance(value, float) else str(value)
 
 
 def _content_policy(scripts: Sequence[str]) -> str:

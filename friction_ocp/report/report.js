@@ -77,7 +77,7 @@
         hoversubplots: "axis",
         margin: underButtons(),
         xaxis: axis("time in s", { anchor: "y2", zeroline: false }),
-        yaxis: axis("value" + within(channel.unit), { domain: [0.37, 1] }),
+        yaxis: axis((channel.name.length > 20 ? "value" : literal(channel.name)) + within(channel.unit), { domain: [0.37, 1] }),
         yaxis2: axis("residual" + within(channel.unit), { domain: [0, 0.29] }),
       },
     };

@@ -79,7 +79,7 @@ def _parameter(name: str, item: Json) -> tuple[str, ...]:
     for found, difference in zip(others, rows(item, "differences"), strict=True):
         known: Json = difference or {}
         relative = known.get("relative")
-        told = percent(relative) if relative is not None else significant(known.get("absolute"), 3)
+        told = percent(relative, 2) if relative is not None else significant(known.get("absolute"), 3)
         cells += [_value(found), told, significant(known.get("deviations"), 2)]
     return (name, unit_text(str(item["unit"])), *cells)
 
