@@ -56,7 +56,7 @@ def gap_map_figure(cells: Sequence[Json], changed: bool) -> Figure:
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
-    axes.set_title("Where the gap is")
+    axes.set_title("Where the gap is" if changed else "Where the free run is off")
     if changed:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     axes.invert_yaxis()

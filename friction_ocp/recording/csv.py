@@ -63,6 +63,10 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
         return
     check_sizes(path, signals)
     values = _whatever_is_a_number(path, layout)
+    if layout.delimiter != "," and not np.any(np.isfinite(values)):
+        with_comma = _whatever_is_a_number(path, replace(layout, decimal=","))
+        if np.any(np.isfinite(with_comma)):
+            values, summary = with_comma, f"{summary}, decimal comma (decimal: ',' in the map)"
     known = [
         replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
         for signal, column in zip(signals, values, strict=True)

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from friction_ocp.plots.numbers import percent, significant, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, part, rows
 
+NEARLY_ALL = 0.999
+"""Share of the gap beyond which it is not told more closely."""
+
 
 def diagnosis_sentence(result: Json) -> str:
     """Say the verdict in one sentence or two."""
@@ -83,6 +86,8 @@ def _closed(closed: Json) -> str:
     if ends[1] < 0.0:
         grown = f"{percent(-overall, 2)} ({percent(-ends[1], 2)} to {percent(-ends[0], 2)})"
         return f"the excess error on recordings left out grows by {grown}: do not rely on it"
+    if ends[0] > NEARLY_ALL:
+        return f"over {percent(NEARLY_ALL)} of the excess error is gone"
     doubt = "" if ends[0] > 0.0 else ", not certainly any"
     return f"{percent(overall, 2)} of the excess error is gone ({low} to {high}{doubt})"
 

@@ -47,6 +47,17 @@ def formats(line: str, quick: bool) -> Check:
     return Check(line, f"{priced.measured}\n{tested.measured}", bool(priced.passed and tested.passed))
 
 
+def looked_at(line: str, quick: bool) -> Check:
+    """Open every page kind in a browser at both widths, and run the tutorials with their pictures.
+
+    Whether a person looked is not measured; what can be is: nothing overflows, is nameless, complains or stays empty.
+    """
+    pages = tests_check(line, "tests/browser")
+    chosen = ("-m", "not slow") if quick else ()
+    tutorials = tests_check(line, "tests/problems/test_tutorials.py", *chosen)
+    return Check(line, f"{pages.measured}\n{tutorials.measured}", bool(pages.passed and tutorials.passed))
+
+
 def tests_check(line: str, *paths: str) -> Check:
     """Run tests of the repository; what is measured is pytest's last line."""
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-o", "addopts=", "-q", *paths]
@@ -60,5 +71,6 @@ MEASURES: Mapping[str, Callable[[str, bool], Check]] = {
     "kills": kills_and_resumes,
     "fuzzing": fuzzing,
     "batch": batches,
+    "looked_at": looked_at,
 }
 """By ID in done_when.yaml."""

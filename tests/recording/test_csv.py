@@ -13,7 +13,7 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.recording.csv import open_csv, read_csv, sniff_layout
 from friction_ocp.recording.hdf5 import read_recording, write_recording
 from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
-from friction_ocp.recording.import_recording import import_recording
+from friction_ocp.recording.import_recording import import_recording, inspect_file
 from friction_ocp.recording.listing import list_signals
 
 MAP = """
@@ -84,6 +84,13 @@ def test_other_encodings_are_read(tmp_path: Path, encoding: str, name: str) -> N
     (tmp_path / "a.csv").write_bytes(f"t,{name}\n0,1\n1,2\n".encode(encoding))
     recording = read_csv(tmp_path / "a.csv", ImportMap(Column("t", "s"), {"x": Column(name, "°")}))
     assert recording.channels["x"].unit == "rad"
+
+
+def test_a_decimal_comma_is_seen_by_inspect(tmp_path: Path) -> None:
+    """A listing reads numbers with a comma, and says what the map has to state."""
+    told = inspect_file(put(tmp_path / "a.csv", "Zeit [s];x [A]\n0,0;1,5\n0,5;2,5\n"))
+    assert "decimal: ',' in the map" in told and "no numbers" not in told
+    assert "2.5" in told
 
 
 def test_decimal_comma_is_read_where_stated(tmp_path: Path) -> None:
