@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 
 import numpy as np
 import peers
 import speed
 from checks import Check
-from servo import script_check
+from servo import ROOT, TEST_RESULT, script_check
 
 MOST_SECONDS = {"polyline": 0.25, "lugre": 0.5}
 MOST_HERE = {"telescope": 0.5, "emps": 0.3, "xl330": 0.5}
@@ -73,11 +75,34 @@ def long_logs(line: str, quick: bool) -> Check:
     return Check(line, text, held)
 
 
+def cover(line: str, quick: bool) -> Check:
+    """Measure the coverage of intervals; draws that are on disk count."""
+    draws = ("--draws", "4", "--wrong", "0", "--only", "linear") if quick else ()
+    return script_check(line, "coverage.py", *draws)
+
+
+def tested(*tests: str) -> Callable[[str, bool], Check]:
+    """Return what measures a line by the tests that state it."""
+
+    def measure(line: str, quick: bool) -> Check:
+        del quick
+        command = [sys.executable, "-m", "pytest", "-v", "-o", "addopts=", "-p", "no:cacheprovider", *tests]
+        run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+        results = TEST_RESULT.findall(run.stdout)
+        rows = [f"{result.lower()}: {name.rpartition('::')[2]}" for name, result in results]
+        return Check(line, "\n".join(rows), bool(results) and all(result == "PASSED" for _, result in results))
+
+    return measure
+
+
 MEASURES: Mapping[str, Callable[[str, bool], Check]] = {
     "speed": speeds,
     "peers": faster_than_peers,
     "long_logs": long_logs,
     "no_smoothing_left": lambda line, quick: script_check(line, "smoothing.py"),
+    "coverage": cover,
     "nist": lambda line, quick: script_check(line, "nist.py"),
+    "outliers": tested("tests/estimation/test_outliers.py"),
+    "statistics": tested("tests/test_cli_statistics.py", "tests/statistics"),
 }
 """By ID in done_when.yaml."""
