@@ -16,6 +16,7 @@ from pathlib import Path
 import diagnosis
 import engine
 import servo
+import telescopes
 import users
 import yaml
 from checks import Check, print_check, status
@@ -27,6 +28,7 @@ MEASURES: Mapping[str, Mapping[str, Measure]] = {
     "engine": engine.MEASURES,
     "users": users.MEASURES,
     "diagnosis": diagnosis.MEASURES,
+    "telescopes": telescopes.MEASURES,
 }
 """By piece of work and ID: (line, quick) -> check."""
 
