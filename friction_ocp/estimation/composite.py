@@ -36,7 +36,7 @@ RIDGE = 1e-8
 """Added to the diagonal of a Hessian, relative: hardly any sample lies where a sharp loss is curved."""
 ACCEPTED = 1e-2
 """Share of the predicted decrease that a step has to gain."""
-LONG = 1.0
+LONG = 1e-2
 """Damping up to which a small predicted decrease is taken for the end rather than for a short step."""
 
 

@@ -2,33 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
-from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
-from friction_ocp.estimation.rounds import COARSE, Fitted, final_solver, limits
-from friction_ocp.estimation.stages import mean_error
-from friction_ocp.estimation.structured import solve_structured
+from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, limits
+from friction_ocp.estimation.stages import ROUNDINGS, keeps_the_loss, mean_error
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
-HOPS = (0.002, 0.005, 0.01)
+HOPS = (0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks, in turn: by what share the quadratic model calls them worse."""
-PATIENCE, MOST_HOPS = 6, 24
-"""Restarts in a row that find nothing better, and all in all, after which that end stands."""
-TRIED = Tolerances(decrease=1e-6, progress=1e-5)
-"""How far an end is followed that may be no better."""
 BETTER = 1e-6
 """Decrease, relative, that counts as something better."""
-SOFTER = ((0.05, 0.01), (0.01, 0.0025))
-"""Rounding of the loss over the mean error and smoothing of the sign over the typical speed on the way back."""
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """How long restarts are tried."""
+
+    patience: int
+    """Restarts in a row that find nothing better, after which an end stands."""
+    most: int
+    tolerances: Tolerances
+    """How far an end is followed that may be no better."""
+
+
+REWEIGHTED = Persistence(6, 6, FINE)
+KEPT = Persistence(8, 24, Tolerances(decrease=1e-6, progress=1e-5))
+"""Where the solver keeps the loss: restarts cost less, and fall into more of the shallow ends."""
 
 
 def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
@@ -49,33 +59,39 @@ def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
 def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     """Leave local minima of a loss with kinks: restart from points that the quadratic model calls slightly worse."""
     program, best, iterations = fitted.program, fitted.solution, fitted.solution.iterations
-    if not isinstance(program.loss, Absolute) or best.smooth:
+    if not isinstance(program.loss, Absolute):
         return fitted
-    rng = np.random.default_rng(model.problem.estimation.seed)
-    size = mean_error(program, best.point)
+    sharp = keeps_the_loss(model, program)
+    tries, solve = (KEPT, solve_composite) if sharp else (REWEIGHTED, solve_gauss_newton)
+    rng, size = np.random.default_rng(model.problem.estimation.seed), mean_error(program, best.point)
     softer = [
-        replace(program, loss=Absolute(rounding * size), width=width * model.speed_scale) for rounding, width in SOFTER
+        replace(program, loss=Absolute(rounding * size), width=width * model.speed_scale)
+        for rounding, width in zip(ROUNDINGS[2:-1], DETOURS, strict=True)
     ]
-    failed, hopped = 0, False
-    for k in range(MOST_HOPS):
-        hop, watch = HOPS[k % len(HOPS)], phases.begin(f"hop {k + 1}")
-        reduced = reduce_system(program.linearise(best.point), 1e-6)
-        step = _on_ellipsoid(reduced.hessian, 2.0 * hop * best.objective, rng)
-        theta = model.space.clip(best.point.theta + step)
-        nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
-        point = Point(theta, nodes)
+    failed = 0
+    for k in range(tries.most):
+        watch = phases.begin(f"hop {k + 1}")
+        point = _hopped(model, program, best, HOPS[k % len(HOPS)], rng)
         for stage in softer:
-            point = solve_structured(stage, point, COARSE, watch).point
-        end = solve_structured(program, point, TRIED, watch)
+            point = solve(stage, point, COARSE, watch).point
+        end = solve(program, point, tries.tolerances, watch)
         iterations += end.iterations
-        hopped = hopped or end.objective < best.objective
         failed = 0 if end.objective < (1.0 - BETTER) * best.objective else failed + 1
         best = min(best, end, key=lambda solution: solution.objective)
-        if failed == PATIENCE:
+        if failed == tries.patience:
             break
-    end = solve_structured(program, best.point, limits(model), phases.begin("best hop")) if hopped else best
-    best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
-    return Fitted(best, program)
+    end = solve(program, best.point, limits(model), phases.begin("best end"))
+    best = min(best, end, key=lambda solution: solution.objective)
+    return Fitted(replace(best, iterations=iterations + end.iterations), program)
+
+
+def _hopped(model: Model, program: Program, best: Solution, share: float, rng: np.random.Generator) -> Point:
+    """Return a random point that the quadratic model calls worse than the best by a share of it."""
+    reduced = reduce_system(program.linearise(best.point), 1e-6)
+    step = _on_ellipsoid(reduced.hessian, 2.0 * share * best.objective, rng)
+    theta = model.space.clip(best.point.theta + step)
+    nodes = tuple(old + move for old, move in zip(best.point.nodes, reduced.node_steps(step), strict=True))
+    return Point(theta, nodes)
 
 
 def _on_ellipsoid(hessian: FloatArray, size: float, rng: np.random.Generator) -> FloatArray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.curriculum import introduced, may_enter_in_turn
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
@@ -18,22 +19,29 @@ from friction_ocp.estimation.release import released
 from friction_ocp.estimation.stages import (
     WIDTHS,
     free_run,
+    keeps_the_loss,
     loss_of_round,
     mean_error,
     predictions,
     relaxed,
     roundings_of,
 )
-from friction_ocp.estimation.structured import solve_structured
+from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances()
+THOROUGH = Tolerances(decrease=1e-13, negligible=1e-11, progress=1e-13)
+"""For ends that have to agree wherever they started."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
 FINALISTS = 5
 """Starts that are followed to the end."""
+GRID = 0.03
+"""Distance of the starts of rounds with kinks over the standard deviation."""
+SAME = 1e-5
+"""Difference of two objectives, relative, up to which two ends are one."""
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
 Solve = Callable[[Program, Point, Tolerances, Watch], Solution]
@@ -75,7 +83,7 @@ def program_builder(model: Model) -> Builder:
 def final_solver(model: Model) -> Solve:
     """Return what solves the programs of a fit: the structured solver, or Ipopt where the problem asks for it."""
     if model.problem.estimation.solver == "gauss_newton":
-        return solve_structured
+        return solve_gauss_newton
     from friction_ocp.estimation.ipopt import solve_ipopt
 
     return solve_ipopt
@@ -100,21 +108,22 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
         if is_sound(model, at_once[0]):
             return at_once
     simple = nested_space(model.problem, model.space)
-    plain = _plain_starts(model, phases)
     if simple is model.space:
-        return _rounds(model, plan, plain, "fit", phases)
+        return _rounds(model, plan, _plain_starts(model, plan, phases), "fit", phases)
     exact = replace(plan, widths=RELEASED_WIDTHS)
     if conclusive:
-        direct = _rounds(model, exact, plain[1:], "direct fit", phases)
+        direct = _rounds(model, exact, [_predicted(model, phases)], "direct fit", phases)
         if is_sound(model, direct[0]):
             return direct
     inner = replace(model, space=simple)
-    nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
+    nested = _rounds(inner, plan, _plain_starts(inner, plan, phases), "simpler friction", phases)
     return _rounds(model, exact, released(model, simple, nested[0].solution.point.theta), "fit", phases)
 
 
-def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
-    return [model.space.guess, _predicted(model, phases)]
+def _plain_starts(model: Model, plan: Plan, phases: Phases) -> list[FloatArray]:
+    starts = [model.space.guess, _predicted(model, phases)]
+    sharp = keeps_the_loss(model, plan.builder(model, plan.widths[0], Squares()))
+    return _same_starts(model, plan, starts, phases) if sharp else starts
 
 
 def _predicted(model: Model, phases: Phases) -> FloatArray:
@@ -143,7 +152,8 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
         program = replace(program, loss=loss_of_round(model, program, points[0], k))
         watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
         last = k == rounds - 1
-        ends = race(program, points, limits(model) if last else COARSE, watch, _solver_of_round(model, k))
+        solve = solve_composite if k > 0 and keeps_the_loss(model, program) else final_solver(model)
+        ends = race(program, points, limits(model) if last else COARSE, watch, solve)
         if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
@@ -151,15 +161,39 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     return [Fitted(replace(end, iterations=iterations), program) for end in ends]
 
 
-def _solver_of_round(model: Model, number: int) -> Solve:
-    """Return what solves a round: reweighting in the first, where even the absolute loss is nearly squares."""
-    solve = final_solver(model)
-    return solve_gauss_newton if number == 0 and solve is solve_structured else solve
-
-
 def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve) -> list[Solution]:
     """Solve from every point and return the ends, best first."""
     return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
+
+
+def _same_starts(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: Phases) -> list[FloatArray]:
+    """Return what least squares with a smooth sign make of some starts, on a grid: the same from wherever they come.
+
+    The rounds of an absolute loss have kinks at which the last digit of a start decides which way they go.
+    """
+    program = plan.builder(model, plan.widths[0], Squares())
+    points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
+    ends = race(program, points, THOROUGH, phases.begin("least squares"), solve_gauss_newton)
+    return [_on_grid(program, end) for end in distinct(ends)]
+
+
+def _on_grid(program: Program, end: Solution) -> FloatArray:
+    """Return the nearest point of a grid of about GRID of the standard deviations, far coarser than ends agree."""
+    theta, space = end.point.theta, program.space
+    told, _ = inverse_information(program.linearise(end.point).theta_theta)
+    samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
+    variance = np.diag(told) * 2.0 * end.objective / max(samples, 1)
+    cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
+    return space.clip(cell * np.round(theta / cell))
+
+
+def distinct(ends: Sequence[Solution]) -> list[Solution]:
+    """Return the ends, best first, without those that coincide with a better one: objectives agree to SAME."""
+    kept: list[Solution] = []
+    for end in ends:
+        if all(end.objective > (1.0 + SAME) * other.objective for other in kept):
+            kept.append(end)
+    return kept
 
 
 def is_noise(program: Program, end: Solution) -> bool:

@@ -10,6 +10,7 @@ from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import gap_weights
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.parameter_space import has_nested
 from friction_ocp.estimation.program import Point, Program, Segments
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
@@ -132,8 +133,17 @@ def roundings_of(model: Model, program: Program) -> tuple[float, ...]:
     """Return the roundings that a fit by the absolute loss goes through; none for another loss."""
     if model.problem.estimation.loss != "absolute":
         return ()
-    few = model.problem.estimation.solver == "gauss_newton" and program.without_nodes
-    return FEW_ROUNDINGS if few else ROUNDINGS
+    return FEW_ROUNDINGS if keeps_the_loss(model, program) else ROUNDINGS
+
+
+def keeps_the_loss(model: Model, program: Program) -> bool:
+    """Whether a fit keeps the absolute loss as it is: the solver that can needs a program without nodes.
+
+    Friction with a simpler one nested in it has several deep ends, of which reweighting finds the same from everywhere.
+    """
+    options = model.problem.estimation
+    able = options.loss == "absolute" and options.solver == "gauss_newton" and program.without_nodes
+    return able and not has_nested(model.problem)
 
 
 def loss_of_round(model: Model, program: Program, best: Point, number: int) -> AbstractLoss:
