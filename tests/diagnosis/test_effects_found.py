@@ -56,7 +56,7 @@ CASES: dict[str, tuple[Callable[[], Plant], str, tuple[str, ...]]] = {
     "periodic_disturbance": (shaft(disturbance=PlantRipple(0.9, (0.1 * TORQUE,), (0.0,))), "motor", ("cogging",)),
     "sensor_delay": (sensor(delay=0.005), "position", ("drive_lag", "quadratic_drag")),
 }
-QUICK = ("quadratic_drag", "drive_lag")
+QUICK = ("quadratic_drag",)
 """Those that every run of the tests tries."""
 
 

@@ -88,7 +88,7 @@ def test_two_masses_follow_the_plant(law: str) -> None:
     assert worst(truth, run, "motor.theta", "motor.omega", "load.theta", "load.omega") < tolerance
 
 
-@pytest.mark.parametrize("law", ["dahl", "lugre"])
+@pytest.mark.parametrize("law", ["dahl", pytest.param("lugre", marks=pytest.mark.slow)])
 def test_bristles_follow_the_plant_through_fast_motion(law: str) -> None:
     """From 20 rad/s with a slack bristle, the deflection settles at once, turns with the motion and does not ring."""
     twin = Twin(Plant((PlantShaft("motor", 0.01, LAWS[law]),), (), MOTOR), {"drive.current": reversals()})

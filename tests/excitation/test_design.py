@@ -87,6 +87,7 @@ def test_a_model_has_no_evidence_against_itself(sharper: Design) -> None:
         assert evidence(sharper.fitted, option.run.recording).separation < 0.01
 
 
+@pytest.mark.slow
 def test_rivals_are_separated_by_the_best_motion(path: Path) -> None:
     """Stribeck friction and quadratic drag, refitted, are told apart better by the first motion than by the last."""
     problem = load_problem(write_case(path.parent, axis(law="stribeck", tau_s=0.15, omega_s=6.0)))

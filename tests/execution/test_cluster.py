@@ -133,6 +133,7 @@ def test_a_multistart_that_loses_a_worker_has_the_same_numbers(workers: Workers,
     np.testing.assert_array_equal(local.estimate.uncertainty.std_error, remote.estimate.uncertainty.std_error)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_that_loses_a_worker_has_the_same_numbers(workers: Workers, tmp_path: Path) -> None:
     """The whole document, but for the time that it took."""
     problem = load_problem(write_case(tmp_path, axis(law="stribeck", tau_s=0.15, omega_s=6.0)))

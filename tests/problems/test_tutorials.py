@@ -56,6 +56,7 @@ def test_a_first_identification(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert {item.verdict.word for item in names["estimate"].parameters} == {"ok"}
 
 
+@pytest.mark.slow
 def test_from_log_to_mujoco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is lost on the way, and the pendulum of MuJoCo comes to rest where the recorded one does."""
     names = run("from_log_to_mujoco", tmp_path, monkeypatch)

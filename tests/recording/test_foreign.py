@@ -202,7 +202,8 @@ def test_sizes_are_refused_before_anything_is_read(tmp_path: Path, monkeypatch: 
 def test_damaged_files_are_findings(tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Nothing, noise and a beginning without its end are told as one finding each, without a traceback."""
     noise = np.random.default_rng(5).bytes(4000)
-    for content in (b"", noise, b"MDF     4.10    " + noise, b"PAR1" + noise + b"PAR1", b"\x89MCAP0\r\n" + noise):
+    begun = {".mf4": b"MDF     4.10    ", ".parquet": b"PAR1", ".mcap": b"\x89MCAP0\r\n"}
+    for content in {b"", noise, begun.get(suffix, b"") + noise}:
         (tmp_path / f"run{suffix}").write_bytes(content)
         assert main(["import", str(tmp_path / f"run{suffix}"), "--inspect"]) == WRONG_INPUT
         said = capsys.readouterr()
