@@ -102,29 +102,23 @@ def heading(problem: Problem) -> dict[str, Any]:
 
 
 def _parameter(item: ParameterEstimate) -> dict[str, Any]:
-    low, high = (number(end) for end in item.interval95)
-    return {
-        "value": item.value,
-        "unit": item.unit,
-        "std_error": number(item.std_error),
-        "interval95": None if low is None or high is None else [low, high],
-        "guess": item.guess,
-        "verdict": item.verdict.word,
-        "traded_with": list(item.verdict.traded_with),
-    }
+    verdict = item.verdict
+    return {**_found(item), "guess": item.guess, "verdict": verdict.word, "traded_with": list(verdict.traded_with)}
 
 
 def _noise_level(item: NoiseLevel, problem: Problem) -> dict[str, Any]:
     """Return an estimated level of torque noise under the keys of a parameter."""
+    guess = problem.estimation.process_noise.get(item.shaft)
+    return {**_found(item), "guess": guess, "verdict": item.verdict, "traded_with": []}
+
+
+def _found(item: ParameterEstimate | NoiseLevel) -> dict[str, Any]:
     low, high = (number(end) for end in item.interval95)
     return {
         "value": item.value,
         "unit": item.unit,
         "std_error": number(item.std_error),
         "interval95": None if low is None or high is None else [low, high],
-        "guess": problem.estimation.process_noise.get(item.shaft),
-        "verdict": item.verdict,
-        "traded_with": [],
     }
 
 

@@ -65,7 +65,7 @@ class LinearRecording:
         self.noise, self.loss = program.noise, program.loss
         self.seen = np.isfinite(self.item.measured)
         time = np.arange(self.item.grid.time.size)
-        self.segment = np.clip(np.searchsorted(self.cut.first, time, side="right") - 1, 0, self.cut.count - 1)
+        self.segment = self.cut.owner(time)
         errors = np.where(self.seen, (self.y - self.item.measured) / self.noise, 0.0)
         self.scaling = np.sqrt(self.loss.weight(errors)) / self.noise
         self.dy = result.dy[:, :, : self.states] * self.scaling[:, :, None]

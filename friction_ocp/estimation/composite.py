@@ -79,17 +79,14 @@ def linearised(program: Program, point: Point) -> Rows:
     """Return the residuals of a program without variable start states, and their derivatives."""
     errors: list[FloatArray] = []
     slopes: list[FloatArray] = []
-    states = len(program.drive.state_names)
     starts = program.measured_starts(point.theta)
     for index, result in enumerate(program.simulate_all(point, derivatives=True)):
-        item, cut = program.experiments[index], program.segments[index]
-        assert result.dy is not None
+        item = program.experiments[index]
         _, by_theta = program.space.numbers_and_slope(point.theta, item.name)
-        owner = np.clip(np.searchsorted(cut.first, np.arange(item.grid.time.size), side="right") - 1, 0, cut.count - 1)
-        slope = result.dy[:, :, states:] @ by_theta + result.dy[:, :, :states] @ starts[index][1][owner]
+        slope = program.output_slopes(index, result, by_theta, starts[index][1])
         seen = np.isfinite(item.measured)
         errors.append(program.residuals(index, result.y)[seen])
-        slopes.append((slope / program.noise[:, None])[seen])
+        slopes.append(slope[seen])
     return Rows(np.concatenate(errors), np.concatenate(slopes), *program.parameter_terms(point.theta))
 
 

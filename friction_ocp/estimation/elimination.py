@@ -68,10 +68,38 @@ def _cyclic_reduction(diagonal: FloatArray, upper: FloatArray, right: FloatArray
     `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s, k). Source: Golub, Van Loan,
     Matrix Computations, 4.5.4.
     """
-    count, states = diagonal.shape[:2]
-    if count == 1:
+    if len(diagonal) == 1:
         return _solve(diagonal, right)
-    odd = count // 2
+    half = halved(diagonal, upper, right)
+    kept = _cyclic_reduction(half.diagonal, half.upper, half.right)
+    odd, inner = len(half.alone), len(kept) - 1
+    result = np.empty_like(right)
+    result[0::2] = kept
+    result[1::2] = half.alone - half.to_left @ kept[:odd]
+    result[1::2][:inner] -= half.to_right[:inner] @ kept[1 : inner + 1]
+    return result
+
+
+@dataclass(frozen=True)
+class Halved:
+    """A block-tridiagonal system without every other block, and how those hang on what is left."""
+
+    diagonal: FloatArray
+    upper: FloatArray
+    right: FloatArray
+    alone: FloatArray
+    """(left out, states, k) solution of the blocks left out where their neighbours are zero."""
+    to_left: FloatArray
+    to_right: FloatArray
+    """(left out, states, states) how much of the neighbour before and after is to be taken off."""
+
+
+def halved(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> Halved:
+    """Eliminate the second, fourth ... block of a symmetric block-tridiagonal system of two or more blocks.
+
+    `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s, k).
+    """
+    odd, states = len(diagonal) // 2, diagonal.shape[1]
     before, after = upper[0::2], upper[1::2]
     following = after if len(after) == odd else np.concatenate([after, np.zeros((1, states, states))])
     sides = [before.transpose(0, 2, 1), following, right[1::2]]
@@ -84,12 +112,7 @@ def _cyclic_reduction(diagonal: FloatArray, upper: FloatArray, right: FloatArray
     even[1 : inner + 1] -= back @ to_right[:inner]
     rest[1 : inner + 1] -= back @ alone[:inner]
     coupling = -(before[: len(even) - 1] @ to_right[: len(even) - 1])
-    kept = _cyclic_reduction(even, coupling, rest)
-    result = np.empty_like(right)
-    result[0::2] = kept
-    result[1::2] = alone - to_left @ kept[:odd]
-    result[1::2][:inner] -= to_right[:inner] @ kept[1 : inner + 1]
-    return result
+    return Halved(even, coupling, rest, alone, to_left, to_right)
 
 
 def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:

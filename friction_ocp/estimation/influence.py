@@ -64,18 +64,16 @@ def _of_recording(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     item, cut = program.experiments[index], program.segments[index]
     result = program.simulate(index, point, derivatives=True)
-    assert result.dy is not None and result.dend is not None
+    assert result.dend is not None
     _, slope = program.space.numbers_and_slope(point.theta, item.name)
     states = point.nodes[index].shape[1]
     nodes = np.concatenate([by_theta, np.zeros((0, *by_theta.shape[1:]))])
     if cut.measured:
         nodes = nodes.copy()
         nodes[: cut.measured] = program.measured_states(item, point.theta, cut.first[: cut.measured])[1]
-    segment = np.clip(np.searchsorted(cut.first, np.arange(item.grid.time.size), side="right") - 1, 0, cut.count - 1)
-    full = np.einsum("noi,nip->nop", result.dy[:, :, :states], nodes[segment]) + result.dy[:, :, states:] @ slope
     errors = program.residuals(index, result.y)
     seen = np.isfinite(errors)
-    rows, residual = (full / program.noise[:, None])[seen], errors[seen]
+    rows, residual = program.output_slopes(index, result, slope, nodes)[seen], errors[seen]
     time = np.broadcast_to(item.grid.time[:, None], errors.shape)[seen]
     loss = program.loss
     parts = [(rows, residual, loss.weight(residual) * residual, loss.curvature(residual), time)]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.optimize as _optimize  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.estimation.elimination import halved
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import RELATIVE_GAP, acceleration_noise, torque_covariance
 from friction_ocp.estimation.model import Model
@@ -130,27 +131,14 @@ def _reduced(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> tupl
 
     `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s).
     """
-    determinant, gained = 0.0, 0.0
+    determinant, gained, right = 0.0, 0.0, right[:, :, None]
     while len(diagonal) > 1:
-        odd, states = len(diagonal) // 2, diagonal.shape[1]
-        before, after = upper[0::2], upper[1::2]
-        following = after if len(after) == odd else np.concatenate([after, np.zeros((1, states, states))])
-        pivot, pull = diagonal[1::2], right[1::2]
-        sides = np.concatenate([before.transpose(0, 2, 1), following, pull[:, :, None]], axis=2)
-        solved = np.linalg.solve(pivot, sides)
-        to_left, to_right, alone = solved[:, :, :states], solved[:, :, states:-1], solved[:, :, -1]
-        determinant += float(np.sum(np.linalg.slogdet(pivot)[1]))
-        gained += float(np.sum(pull * alone))
-        even, rest, inner = diagonal[0::2].copy(), right[0::2].copy(), len(after)
-        even[:odd] -= before @ to_left
-        rest[:odd] -= np.einsum("kij,kj->ki", before, alone)
-        back = after.transpose(0, 2, 1)
-        even[1 : inner + 1] -= back @ to_right[:inner]
-        rest[1 : inner + 1] -= np.einsum("kij,kj->ki", back, alone[:inner])
-        upper = -(before[: len(even) - 1] @ to_right[: len(even) - 1])
-        diagonal, right = 0.5 * (even + even.transpose(0, 2, 1)), rest
+        half = halved(diagonal, upper, right)
+        determinant += float(np.sum(np.linalg.slogdet(diagonal[1::2])[1]))
+        gained += float(np.sum(right[1::2] * half.alone))
+        diagonal, upper, right = 0.5 * (half.diagonal + half.diagonal.transpose(0, 2, 1)), half.upper, half.right
     last = np.asarray(np.linalg.solve(diagonal[0], right[0]), dtype=np.float64)
-    return determinant + float(np.linalg.slogdet(diagonal[0])[1]), gained + float(right[0] @ last)
+    return determinant + float(np.linalg.slogdet(diagonal[0])[1]), gained + float(np.sum(right[0] * last))
 
 
 def most_likely(model: Model, program: Program, point: Point) -> tuple[NoiseLevel, ...]:

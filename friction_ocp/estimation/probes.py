@@ -88,7 +88,7 @@ def _seen(program: Program, point: Point, index: int, sensed: SteppedDrive, coun
     for k, size in enumerate(np.where(theta != 0, np.abs(theta), program.space.scale)):
         step = STEP * size * np.eye(theta.size)[k]
         columns.append((look(here, theta + step) - value) / (STEP * size))
-    segment = np.clip(np.searchsorted(cut.first, nodes, side="right") - 1, 0, cut.count - 1)
+    segment = cut.owner(nodes)
     return _Seen(value, np.stack(columns, axis=2), segment, stride)
 
 

@@ -43,6 +43,10 @@ class Segments:
         """Number of segments."""
         return len(self.first) - 1
 
+    def owner(self, nodes: IntArray) -> IntArray:
+        """Return the index of the segment that each grid node belongs to; the closing node to the last one."""
+        return np.clip(np.searchsorted(self.first, nodes, side="right") - 1, 0, self.count - 1)
+
     @property
     def tied(self) -> IntArray:
         """Indices of the nodes that have a prior."""
@@ -105,6 +109,11 @@ class Program:
     def without_nodes(self) -> bool:
         """Whether no start state is a variable: each is what the measurement says."""
         return all(cut.measured == cut.count for cut in self.segments)
+
+    @property
+    def samples(self) -> int:
+        """How many samples there are in all recordings."""
+        return sum(int(np.isfinite(item.measured).sum()) for item in self.experiments)
 
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement."""
@@ -195,6 +204,16 @@ class Program:
             nodes = np.concatenate([start, nodes[cut.measured :]])
         numbers = self.space.numbers(point.theta, item.name)
         return SweepRequest(item.grid, cut.first, nodes, numbers, self.width, derivatives, with_states)
+
+    def output_slopes(self, index: int, result: SweepResult, slope: FloatArray, nodes: FloatArray) -> FloatArray:
+        """Return (n, outputs, parameters) the derivatives of a recording's outputs over their noise floors.
+
+        `slope` (active, parameters) is that of its numbers, `nodes` (segments, states, parameters) that of its nodes.
+        """
+        assert result.dy is not None
+        states, owner = nodes.shape[1], self.segments[index].owner(np.arange(len(result.y)))
+        full = result.dy[:, :, :states] @ nodes[owner] + result.dy[:, :, states:] @ slope
+        return full / self.noise[:, None]
 
     def residuals(self, index: int, y: FloatArray) -> FloatArray:
         """Return (n, outputs) errors over the noise floor, NaN where there is no sample."""

@@ -52,6 +52,6 @@ def _shift(coarse: Program, fine: Program, point: Point) -> FloatArray:
     reduced = [reduce_system(system, 1e-9) for system in systems]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
-    samples = sum(int(np.isfinite(item.measured).sum()) for item in coarse.experiments)
+    samples = coarse.samples
     misfit = max(1.0, 2.0 * systems[0].objective / max(samples, 1))
     return np.abs(move) / np.sqrt(np.maximum(np.diag(told), 1e-300) * misfit)

@@ -181,7 +181,7 @@ def _on_grid(program: Program, end: Solution) -> FloatArray:
     """Return the nearest point of a grid of about GRID of the standard deviations, far coarser than ends agree."""
     theta, space = end.point.theta, program.space
     told, _ = inverse_information(program.linearise(end.point).theta_theta)
-    samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
+    samples = program.samples
     variance = np.diag(told) * 2.0 * end.objective / max(samples, 1)
     cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
     return space.clip(cell * np.round(theta / cell))
@@ -200,7 +200,7 @@ def is_noise(program: Program, end: Solution) -> bool:
     """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
     if not isinstance(program.loss, Squares):
         return False
-    samples = sum(int(np.isfinite(item.measured).sum()) for item in program.experiments)
+    samples = program.samples
     return end.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
 
 
