@@ -18,7 +18,6 @@ from friction_ocp.estimation.rounds import (
     COARSE,
     Fitted,
     Plan,
-    distinct,
     final_solver,
     is_noise,
     is_sound,
@@ -39,6 +38,8 @@ RELEASED_AT = 0.25
 """Windows over the horizon, one of GROWTH, over which a nested model is fitted and the full one released."""
 FOLLOWED = 3
 """Distinct ends of the relaxed fit that are continued on free runs."""
+SAME = 1e-5
+"""Difference of two objectives, relative, up to which two ends are one."""
 HOPELESS = 10.0
 """Objective over the best one beyond which an end is not continued."""
 
@@ -134,7 +135,9 @@ def _interval(model: Model) -> float:
 
 
 def _distinct(ends: Sequence[Fitted]) -> list[Fitted]:
-    """Drop ends that coincide with a better one, and hopeless ones."""
-    kept = distinct([end.solution for end in ends])
-    hopeful = [solution for solution in kept if solution.objective <= HOPELESS * kept[0].objective]
-    return [end for end in ends if any(end.solution is solution for solution in hopeful)]
+    """Return the ends, best first, without those that coincide with a better one and without hopeless ones."""
+    kept: list[Fitted] = []
+    for end in ends:
+        if all(end.solution.objective > (1.0 + SAME) * other.solution.objective for other in kept):
+            kept.append(end)
+    return [end for end in kept if end.solution.objective <= HOPELESS * kept[0].solution.objective]

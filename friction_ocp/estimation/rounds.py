@@ -40,8 +40,6 @@ FINALISTS = 5
 """Starts that are followed to the end."""
 GRID = 0.03
 """Distance of the starts of rounds with kinks over the standard deviation."""
-SAME = 1e-5
-"""Difference of two objectives, relative, up to which two ends are one."""
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
 Solve = Callable[[Program, Point, Tolerances, Watch], Solution]
@@ -123,7 +121,7 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
 def _plain_starts(model: Model, plan: Plan, phases: Phases) -> list[FloatArray]:
     starts = [model.space.guess, _predicted(model, phases)]
     sharp = keeps_the_loss(model, plan.builder(model, plan.widths[0], Squares()))
-    return _same_starts(model, plan, starts, phases) if sharp else starts
+    return [_same_start(model, plan, starts, phases)] if sharp else starts
 
 
 def _predicted(model: Model, phases: Phases) -> FloatArray:
@@ -166,15 +164,16 @@ def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: W
     return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
 
 
-def _same_starts(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: Phases) -> list[FloatArray]:
-    """Return what least squares with a smooth sign make of some starts, on a grid: the same from wherever they come.
+def _same_start(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: Phases) -> FloatArray:
+    """Return the best that least squares with a smooth sign make of some starts, on a grid.
 
     The rounds of an absolute loss have kinks at which the last digit of a start decides which way they go.
+    From here they go the same way wherever the fit started.
     """
     program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
     ends = race(program, points, THOROUGH, phases.begin("least squares"), solve_gauss_newton)
-    return [_on_grid(program, end) for end in distinct(ends)]
+    return _on_grid(program, ends[0])
 
 
 def _on_grid(program: Program, end: Solution) -> FloatArray:
@@ -185,15 +184,6 @@ def _on_grid(program: Program, end: Solution) -> FloatArray:
     variance = np.diag(told) * 2.0 * end.objective / max(samples, 1)
     cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
     return space.clip(cell * np.round(theta / cell))
-
-
-def distinct(ends: Sequence[Solution]) -> list[Solution]:
-    """Return the ends, best first, without those that coincide with a better one: objectives agree to SAME."""
-    kept: list[Solution] = []
-    for end in ends:
-        if all(end.objective > (1.0 + SAME) * other.objective for other in kept):
-            kept.append(end)
-    return kept
 
 
 def is_noise(program: Program, end: Solution) -> bool:
