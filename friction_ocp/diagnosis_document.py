@@ -10,7 +10,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, samples
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered, samples
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
@@ -41,7 +41,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "rounds": [_round(diagnosis, item) for item in diagnosis.rounds],
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
         "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
-        "accepted": [{**_named(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
+        "accepted": [{**_explained(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
         "remainder": _remainder(diagnosis),
         "gap": _gap(diagnosis),
         "biased_parameters": [_bias(item) for item in biased_parameters(diagnosis.base, diagnosis.final)],
@@ -56,6 +56,10 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
 
 def _named(key: Key) -> dict[str, str]:
     return {"effect": key[0], "component": key[1]}
+
+
+def _explained(key: Key) -> dict[str, str]:
+    return {**_named(key), "meaning": effects()[key[0]].sentence}
 
 
 def _next_experiment(following: FollowUp) -> dict[str, Any]:
@@ -129,7 +133,7 @@ def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
     rest = [seen for seen in item.screened if seen.key not in refitted]
     causes += [
         {
-            **_named(seen.key),
+            **_explained(seen.key),
             "probability": 0.0,
             "predicted_gain": _share(seen.gain, available),
             "refit_gain": None,
@@ -150,7 +154,7 @@ def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
 def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[str, Any]:
     own = _own(item.before, rival.fitted)
     return {
-        **_named(rival.key),
+        **_explained(rival.key),
         "probability": chance,
         "predicted_gain": _share(rival.screened.gain, available),
         "refit_gain": _share(item.before.objective - rival.fitted.objective, available),
@@ -248,11 +252,13 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
         f"{name}: noise floor {floor.std:.3g} {units.get(name, '')} ({floor.source})"
         for name, floor in diagnosis.base.model.floors.items()
     ]
-    lines += [
-        f"{shaft}: torque noise {density:.3g} N m/sqrt(Hz), from the measured inputs and what the file states"
-        for shaft, density in foot.density.items()
-    ]
+    for shaft, density in foot.density.items():
+        unit = si_unit("torque", diagnosis.problem.drive.shaft(shaft).motion)
+        noise = f"torque noise {density:.3g} {unit}/sqrt(Hz)"
+        lines.append(f"{shaft}: {noise}, from the measured inputs and what the file states")
     lines += [] if diagnosis.stated is None else corrections(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
-    lines.append(f"the catalogue: {', '.join(effects())}")
+    left_out = [name for name in effects() if name not in considered(diagnosis.problem)]
+    lines.append(f"the catalogue: {', '.join(name for name in effects() if name not in left_out)}")
+    lines += [f"left out of the catalogue by the file: {', '.join(left_out)}"] if left_out else []
     return lines

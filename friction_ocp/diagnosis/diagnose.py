@@ -220,6 +220,11 @@ def _reexamined(
     return current, accepted
 
 
+def considered(problem: Problem) -> list[str]:
+    """Return the names of the effects that compete: the catalogue, as far as the file does not narrow it."""
+    return _options(problem)[1]
+
+
 def _options(problem: Problem) -> tuple[float, list[str]]:
     """Return the level of significance and the names of the effects to consider."""
     known = list(effects())

@@ -48,23 +48,41 @@ def warnings_of(
     texts: list[str] = []
     if not solution.converged:
         texts.append(f"The solver did not converge: {solution.message}. The values below are its last iterate.")
-    texts += [_parameter_warning(item) for item in parameters if item.verdict.word != "ok"]
+    texts += [_parameter_warning(item) for item in parameters if item.verdict.word not in ("ok", "traded")]
+    texts += _trade_warnings([item for item in parameters if item.verdict.word == "traded"])
     texts += _misfit_warnings(doubt, residuals, scored)
     return tuple(texts)
 
 
 def _parameter_warning(item: NamedVerdict) -> str:
-    shown = f"{item.name} = {item.value:.4g} {item.unit}"
-    match item.verdict.word:
-        case "at_bound":
-            return f"{shown} lies on its bound: widen the bound, or the model asks the parameter for something else."
-        case "not_identifiable":
-            return f"{shown}: the recordings do not tell this parameter; fix it, give a prior, or record what shows it."
-        case _:
-            return (
-                f"{shown} is traded with {', '.join(item.verdict.traded_with)}: only a combination of them is known; "
-                "fix one, give a prior, or record what tells them apart."
-            )
+    shown = _shown(item)
+    if item.verdict.word == "at_bound":
+        return f"{shown} lies on its bound: widen the bound, or the model asks the parameter for something else."
+    return f"{shown}: the recordings do not tell this parameter; fix it, give a prior, or record what shows it."
+
+
+def _shown(item: NamedVerdict) -> str:
+    return f"{item.name} = {item.value:.4g} {'' if item.unit == '1' else item.unit}".rstrip()
+
+
+def _trade_warnings(traded: Sequence[NamedVerdict]) -> list[str]:
+    """Say once of every group of parameters that trade with one another that they do."""
+    groups: dict[frozenset[str], list[NamedVerdict]] = {}
+    for item in traded:
+        groups.setdefault(frozenset((item.name, *item.verdict.traded_with)), []).append(item)
+    texts: list[str] = []
+    for names, members in groups.items():
+        own = [item.name for item in members]
+        others = sorted(names - set(own))
+        what = ", ".join(_shown(item) for item in members)
+        against = "one another" if len(own) > 1 else ""
+        partners = " and ".join(part for part in (against, ", ".join(others)) if part)
+        verb = "is" if len(own) == 1 else "are"
+        texts.append(
+            f"{what} {verb} traded with {partners}: only a combination of them is known; "
+            "fix one, give a prior, or record what tells them apart."
+        )
+    return texts
 
 
 def _misfit_warnings(doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored) -> list[str]:
@@ -84,5 +102,6 @@ def _misfit_warnings(doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Wh
             )
     for name, (errors, _) in scored.train_errors.items():
         if errors.noise_ratio > 2.0:
-            texts.append(f"{name}: the error of the free run is {errors.noise_ratio:.3g} times the noise floor.")
+            times = f"{errors.noise_ratio:.{0 if errors.noise_ratio >= 100 else 1}f}"
+            texts.append(f"{name}: the error of the free run is {times} times the noise floor.")
     return texts

@@ -13,7 +13,7 @@ def design_sentence(result: Json) -> str:
         return "No motion keeps the limits, or none could be simulated: widen the limits."
     best = options[0]
     share = float(best["amplitude"])
-    what = f"Record {best['sentence']}" + (f", at {percent(share, 2)} of their size" if share < 0.995 else "")
+    what = f"Record {best['sentence']}" + (f", at {percent(share, 2)} of full size" if share < 0.995 else "")
     rivals = rows(result, "separates")
     if rivals:
         named = " and ".join(f"{str(item['effect']).replace('_', ' ')} at {item['component']}" for item in rivals)

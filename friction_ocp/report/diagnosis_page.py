@@ -44,6 +44,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "evaluated_on": rows(gap, "evaluated_on"),
             "horizon": plain(gap["horizon_s"]) if gap.get("horizon_s") is not None else "",
             "changed": bool(rows(result, "accepted")),
+            "drifts": result.get("verdict") in ("no_gap", "explained"),
             "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
             "rounds": [_round(item) for item in rows(result, "rounds")],
             "aliases": alias_sentences(result),
@@ -87,6 +88,7 @@ def _cause(cause: Json) -> dict[str, str]:
     values = part(cause, "parameters").items() if refitted else ()
     return {
         "effect": str(cause["effect"]).replace("_", " "),
+        "meaning": str(cause.get("meaning") or ""),
         "component": str(cause["component"]),
         "probability": whole_percent(cause["probability"]) if refitted else NOTHING,
         "p_value": significant(cause.get("p_value"), 2),

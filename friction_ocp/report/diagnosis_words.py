@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friction_ocp.plots.numbers import percent, significant, unit_text, whole_percent
+from friction_ocp.plots.numbers import is_number, percent, significant, to_resolution, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, part, rows
 
 NEARLY_ALL = 0.999
@@ -13,7 +13,7 @@ NEARLY_ALL = 0.999
 
 def diagnosis_sentence(result: Json) -> str:
     """Say the verdict in one sentence or two."""
-    accepted = [_named(item) for item in rows(result, "accepted")]
+    accepted = [_explained(item) for item in rows(result, "accepted")]
     closed = part(part(result, "gap"), "shrink")
     match str(result.get("verdict")):
         case "no_gap":
@@ -25,9 +25,11 @@ def diagnosis_sentence(result: Json) -> str:
             return f"There is a gap, and several causes fit it: {likely}."
         case _ if accepted:
             found = f"The model lacked {_listed(accepted)}, with which {_closed(closed)}"
-            return f"{found}; what is left is more than noise, and nothing in the catalogue explains it."
+            return (
+                f"{found}; what is left{_place(result)} is more than noise, and nothing in the catalogue explains it."
+            )
         case _:
-            return "There is a gap beyond the noise, and nothing in the catalogue explains it."
+            return f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
 
 
 def round_sentence(item: Json) -> str:
@@ -35,7 +37,9 @@ def round_sentence(item: Json) -> str:
     chances = part(item, "probabilities")
     none, outside = (whole_percent(chances[key]) for key in ("no_effect", "outside_catalogue"))
     accepted = part(item, "accepted")
-    decided, when = (f"Added: {_named(accepted)}.", "Before it") if accepted else ("Nothing was added.", "So far")
+    tried = any(cause.get("refit_gain") is not None for cause in rows(item, "causes"))
+    why = ": no candidate is certain to help on recordings left out" if tried else ""
+    decided, when = (f"Added: {_named(accepted)}.", "Before it") if accepted else (f"Nothing was added{why}.", "So far")
     power = significant(part(item, "excess")["ratio"], 2)
     return (
         f"{decided} {when} the errors of one-step predictions have {power} times the power of their noise. "
@@ -56,10 +60,17 @@ def bias_sentences(result: Json) -> list[str]:
         unit = unit_text(str(item.get("unit", "")))
         off = ""
         if after * before > 0:
-            off = f", {100 * abs(before / after - 1.0):.0f} % too {'high' if before > after else 'low'}"
-        sizes = f"{significant(before, 3)} {unit} before, {significant(after, 3)} {unit} after"
+            off = f", {percent(abs(before / after - 1.0), 2)} too {'high' if before > after else 'low'}"
+        error = _standard_error(item)
+        sizes = f"{to_resolution(before, error)} {unit} before, {to_resolution(after, error)} {unit} after"
         lines.append(f"{item['name']}: {sizes}{off}")
     return lines
+
+
+def _standard_error(item: Json) -> float | None:
+    """Return the standard error of a parameter as its interval tells it."""
+    low, high = (rows(item, "interval95") or [None, None])[:2]
+    return (high - low) / (2.0 * 1.96) if is_number(low) and is_number(high) else None
 
 
 def diagnosis_summary(result: Json) -> str:
@@ -77,6 +88,17 @@ def diagnosis_summary(result: Json) -> str:
 
 def _named(item: Json) -> str:
     return f"{str(item['effect']).replace('_', ' ')} at {item['component']}"
+
+
+def _explained(item: Json) -> str:
+    meaning = item.get("meaning")
+    return f"{_named(item)} ({meaning})" if meaning else _named(item)
+
+
+def _place(result: Json) -> str:
+    """Say where what is left shows."""
+    component = part(result, "remainder").get("component")
+    return f" at {component}" if component else ""
 
 
 def _closed(closed: Json) -> str:

@@ -70,6 +70,7 @@ def render_report(result: Json, series: Series) -> str:
             "static": static_rows(part(result, "fit")),
             "parts": fit_rows_by_recording(part(result, "fit")),
             "recordings": _recordings(result, series),
+            "any_traded": any(rows(item, "traded_with") for item in objects(result, "parameters").values()),
             "friction": friction,
             "friction_json": embedded_json(friction),
             "compensation": compensation_section(result),
@@ -83,8 +84,10 @@ def render_report(result: Json, series: Series) -> str:
 
 
 def paragraphs(text: str) -> list[str]:
-    """Return the paragraphs of plain text, the line breaks within each dropped."""
-    return [" ".join(block.split()) for block in text.split("\n\n") if block.strip()]
+    """Return the paragraphs of a question: without the line breaks within each, and without "Asked:" before it."""
+    blocks = text.strip().removeprefix("Asked:").strip()
+    found = [" ".join(block.split()) for block in blocks.split("\n\n") if block.strip()]
+    return [found[0][:1].upper() + found[0][1:], *found[1:]] if found else []
 
 
 def render_page(template: str, context: Mapping[str, Any]) -> str:
@@ -150,6 +153,8 @@ def _fact(value: Any) -> str:
             return f"{content['name']} {_fact(content.get('options'))}".rstrip()
         told = {key.replace("_", " "): _fact(item) for key, item in content.items()}
         return ", ".join(f"{key} {text}" for key, text in told.items() if text)
+    if isinstance(value, list | tuple):
+        return ", ".join(_fact(item) for item in cast("Sequence[Any]", value))
     if value is None:
         return ""
     return significant(value, 3) if isinstance(value, float) else str(value)

@@ -106,7 +106,7 @@
       data,
       layout: {
         showlegend: plot.curves.length > 1,
-        margin: underButtons(),
+        ...(plot.curves.length > 1 ? { margin: underButtons() } : {}),
         xaxis: axis("speed" + within(plot.speed_unit)),
         yaxis: axis("friction torque" + within(plot.torque_unit)),
       },
@@ -233,9 +233,43 @@
   document.querySelectorAll("table.sortable th[aria-sort]").forEach((header) =>
     header.querySelector("button").addEventListener("click", () => sortBy(header)));
 
+  // A table that is wider than a phone becomes a card a row: every cell beside the header of its column.
+  function label(table) {
+    const heads = Array.from(table.tHead.rows[0].cells, (cell) => cell.textContent.trim());
+    Array.from(table.tBodies).forEach((body) => {
+      const spans = [];
+      Array.from(body.rows).forEach((row) => {
+        let column = 0;
+        Array.from(row.cells).forEach((cell) => {
+          while (spans[column] > 0) spans[column++] -= 1;
+          cell.dataset.label = heads[column] || "";
+          spans[column++] = cell.rowSpan - 1;
+        });
+      });
+    });
+    // What is no table for the eye remains one for a screen reader.
+    const roles = { table: "table", thead: "rowgroup", tbody: "rowgroup", tr: "row", td: "cell" };
+    [table, ...table.querySelectorAll("thead, tbody, tr, td")].forEach((element) =>
+      element.setAttribute("role", roles[element.localName]));
+    table.querySelectorAll("th").forEach((head) =>
+      head.setAttribute("role", head.scope.startsWith("row") ? "rowheader" : "columnheader"));
+  }
+  const tables = Array.from(document.querySelectorAll(".scroll > table")).filter((table) =>
+    table.tHead && !table.classList.contains("correlation"));
+  tables.forEach(label);
+  const fold = () => tables.forEach((table) => {
+    table.classList.remove("cards");
+    table.classList.toggle("cards", narrow() && table.scrollWidth > table.parentElement.clientWidth + 1);
+  });
+  window.addEventListener("resize", fold);
+  document.querySelectorAll("details").forEach((details) => details.addEventListener("toggle", fold));
+  fold();
+
   // Paper is white and narrower than most windows.
   const onPaper = (printing) => {
     root.classList.toggle("printing", printing);
+    if (printing) tables.forEach((table) => table.classList.remove("cards"));
+    else fold();
     document.querySelectorAll("details").forEach((details) => { details.open = printing; });
     document.querySelectorAll(".plot").forEach((plot) => repaint(plot, printing
       ? { width: plot.closest(".pairs") ? 325 : 680, height: 0.86 * plot.dataset.height }

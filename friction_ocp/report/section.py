@@ -24,6 +24,13 @@ class StatisticTable:
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
 
+    @property
+    def filled(self) -> StatisticTable:
+        """The same without the columns that are empty in every row."""
+        kept = [k for k in range(len(self.columns)) if any(row[k] for row in self.rows)]
+        own = tuple(tuple(row[k] for k in kept) for row in self.rows)
+        return StatisticTable(self.caption, tuple(self.columns[k] for k in kept), own)
+
 
 @dataclass(frozen=True)
 class StatisticSection:
@@ -62,12 +69,13 @@ def listed(words: Iterable[str]) -> str:
 
 def table_lines(table: StatisticTable) -> list[str]:
     """Return a table as aligned plain text, without the columns that are empty."""
-    cells = [tuple(column.head for column in table.columns), *table.rows]
-    kept = [k for k in range(len(table.columns)) if any(row[k] for row in table.rows)]
-    widths = {k: max(len(row[k]) for row in cells) for k in kept}
+    filled = table.filled
+    cells = [tuple(column.head for column in filled.columns), *filled.rows]
+    widths = [max(map(len, texts)) for texts in zip(*cells, strict=True)]
     return [
         "  ".join(
-            row[k].rjust(widths[k]) if table.columns[k].number else row[k].ljust(widths[k]) for k in kept
+            text.rjust(width) if column.number else text.ljust(width)
+            for text, width, column in zip(row, widths, filled.columns, strict=True)
         ).rstrip()
         for row in cells
     ]

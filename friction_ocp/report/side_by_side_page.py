@@ -49,7 +49,8 @@ def side_by_side_sentence(document: Json) -> str:
     found = [item for each in objects(document, "parameters").values() for item in rows(each, "differences") if item]
     told = [item for item in found if item["deviations"] is not None]
     if not told:
-        return f"{len(found)} estimates beside those of the first result; they share recordings."
+        what = f"{len(found)} estimates stand beside those of the first result"
+        return f"{what}; the results share recordings, so that chance cannot be told from difference."
     beyond = sum(abs(float(item["deviations"])) > NOTABLE for item in told)
     return f"{beyond} of {len(told)} estimates are more than {NOTABLE:g} standard deviations from the first result's."
 
@@ -63,8 +64,12 @@ def side_by_side_text(document: Json) -> str:
 
 def _tables(document: Json) -> tuple[StatisticTable, ...]:
     names = [str(item["name"]) for item in rows(document, "results")]
-    heads = [names[0], *(f"{name}|difference|in deviations" for name in names[1:])]
-    parameters = tuple(_parameter(name, item) for name, item in objects(document, "parameters").items())
+    found = objects(document, "parameters")
+    in_deviations = any(
+        item and item["deviations"] is not None for each in found.values() for item in rows(each, "differences")
+    )
+    heads = [names[0], *(f"{name}|difference" + ("|in deviations" if in_deviations else "") for name in names[1:])]
+    parameters = tuple(_parameter(name, item, in_deviations) for name, item in found.items())
     errors = tuple(_error(item) for item in rows(document, "errors"))
     told = StatisticTable("Parameters.", columns("Parameter | Unit", "|".join(heads)), parameters)
     if not errors:
@@ -73,14 +78,14 @@ def _tables(document: Json) -> tuple[StatisticTable, ...]:
     return told, StatisticTable(caption, columns("Channel | Recordings | Unit", "|".join(names)), errors)
 
 
-def _parameter(name: str, item: Json) -> tuple[str, ...]:
+def _parameter(name: str, item: Json, in_deviations: bool) -> tuple[str, ...]:
     first, *others = rows(item, "values")
     cells = [_value(first)]
     for found, difference in zip(others, rows(item, "differences"), strict=True):
         known: Json = difference or {}
         relative = known.get("relative")
         told = percent(relative, 2) if relative is not None else significant(known.get("absolute"), 3)
-        cells += [_value(found), told, significant(known.get("deviations"), 2)]
+        cells += [_value(found), told, *([significant(known.get("deviations"), 2)] if in_deviations else [])]
     return (name, unit_text(str(item["unit"])), *cells)
 
 

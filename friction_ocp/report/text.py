@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from friction_ocp.plots.numbers import significant
 from friction_ocp.report.compensation import compensation_sentence
-from friction_ocp.report.section import table_lines
+from friction_ocp.report.section import Column, StatisticTable, table_lines
 from friction_ocp.report.statistics import statistic_section, whole_verdict
+from friction_ocp.report.tables import parameter_rows
+
+_HEADS = ("parameter", "value", "95 % interval", "unit", "verdict")
 
 
 def summary(result: Mapping[str, Any]) -> str:
@@ -36,16 +40,12 @@ def summary(result: Mapping[str, Any]) -> str:
 def _parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     if not parameters:
         return []
-    width = max(len(name) for name in parameters)
-    lines: list[str] = []
-    for name, item in parameters.items():
-        doubt = "" if item["std_error"] is None else f" +- {1.96 * item['std_error']:.2g}"
-        lines.append(f"{name:<{width}}  {item['value']:>11.5g}{doubt:<12} {item['unit']:<14} {item['verdict']}")
-    return [*lines, ""]
+    found = [(row.name, row.value.text, row.interval.text, row.unit, row.verdict) for row in parameter_rows(parameters)]
+    heads = (Column(head, number) for head, number in zip(_HEADS, (False, True, True, False, False), strict=True))
+    return [*table_lines(StatisticTable("", tuple(heads), tuple(found))), ""]
 
 
 def _error(errors: Mapping[str, Any]) -> str:
-    return (
-        f"rms {errors['rms']:.4g} {errors['unit']}, mean absolute {errors['mae']:.4g} {errors['unit']}, "
-        f"{errors['noise_ratio']:.3g} x noise floor ({errors['noise_source']})"
-    )
+    rms, mean, ratio = (significant(errors[key], 3) for key in ("rms", "mae", "noise_ratio"))
+    unit = errors["unit"]
+    return f"rms {rms} {unit}, mean absolute {mean} {unit}, {ratio} x noise floor ({errors['noise_source']})"

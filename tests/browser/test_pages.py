@@ -112,6 +112,24 @@ def test_an_identification_opens(width: int, example: str, page: Page) -> None:
     assert_fits(page)
 
 
+def test_a_table_wider_than_a_phone_becomes_cards(example: str, page: Page) -> None:
+    """Nothing of it is beyond the edge, every cell stands beside its header, and it remains a table to be read out."""
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.goto(example)
+    table = page.locator("table.parameters").first
+    assert "cards" in (table.get_attribute("class") or "")
+    assert page.evaluate("() => document.querySelector('table.parameters').getBoundingClientRect().right") <= 390
+    cells = page.evaluate(
+        "() => [...document.querySelectorAll('table.parameters tbody tr')[0].cells].map((cell) => [cell.dataset.label, "
+        "cell.getBoundingClientRect().right <= innerWidth])"
+    )
+    assert [label.split()[0] for label, _ in cells][:4] == ["Parameter", "Value", "Unit", "95"]
+    assert all(inside for _, inside in cells)
+    assert page.get_by_role("table").first.get_by_role("cell").count() > 3
+    page.set_viewport_size({"width": 1200, "height": 800})
+    page.wait_for_function("() => !document.querySelector('table.parameters').classList.contains('cards')")
+
+
 SHOWN = "() => ((range) => range[1] - range[0])(document.querySelectorAll('.plot')[1].layout.xaxis.range)"
 """Seconds that the second plot shows."""
 

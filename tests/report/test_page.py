@@ -15,7 +15,11 @@ from plotly.offline import get_plotlyjs
 from report_example import Result, Series, identified, parameter
 
 from friction_ocp.report import write_report
+from friction_ocp.report.page import paragraphs
 from friction_ocp.report.payload import embedded_json
+from friction_ocp.report.section import StatisticTable, columns
+from friction_ocp.report.tables import parameter_rows
+from friction_ocp.report.text import summary
 
 HOSTILE = (
     "<script>alert(1)</script>",
@@ -198,3 +202,29 @@ def test_importing_draws_in_no_plotting_library() -> None:
     code = "import sys, friction_ocp.plots, friction_ocp.report; print({'matplotlib', 'plotly'} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "set()"
+
+
+def test_the_summary_in_the_terminal_has_the_digits_of_the_page() -> None:
+    """Values, intervals, units and verdicts stand in columns, as the parameter table writes them."""
+    result, _ = identified(600)
+    lines = summary(result).splitlines()
+    row = parameter_rows(result["parameters"])[0]
+    line = next(line for line in lines if line.startswith(f"{row.name} "))
+    for text in (row.value.text, row.interval.text, row.unit, row.verdict):
+        assert text in line
+    assert next(line for line in lines if line.startswith("parameter")).split() == [
+        *("parameter", "value", "95", "%", "interval", "unit", "verdict")
+    ]
+
+
+def test_a_question_is_not_asked_twice() -> None:
+    """The word that opens a problem file's comment is the heading of the page."""
+    assert paragraphs("Asked: how far\nit goes.\n\nKnown: all.") == ["How far it goes.", "Known: all."]
+    assert paragraphs("") == []
+
+
+def test_columns_that_say_nothing_are_left_out() -> None:
+    """Of a statistic's table, on the page as in the terminal."""
+    table = StatisticTable("c", columns("Name | Remark", "Value"), (("a", "", "1"), ("b", "", "2")))
+    assert [column.head for column in table.filled.columns] == ["Name", "Value"]
+    assert table.filled.rows == (("a", "1"), ("b", "2"))
