@@ -10,12 +10,13 @@ import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered, samples
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.select import Rival, probabilities
+from friction_ocp.diagnosis.worth import samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -14,23 +15,29 @@ from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Motor
 from friction_ocp.drive.stepping import state_symbols
-from friction_ocp.effects.effect import Clues, Track
+from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
 SMOOTHING_STEPS = 4
+FINE, MOST_FINE = 4, 3000
+"""Samples in the segments that show what torque is missing as finely as recordings tell; most such segments in one."""
 
 
 def clues_of(fitted: FittedModel) -> Clues:
     """Return what the fitted model says about motions and torques."""
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
-    smoothers = _smoothers(fitted)
-    tracks = tuple(_track(fitted, index, watch, names, smoothers[index]) for index in range(len(smoothers)))
+    coarse = _smoothers(fitted, fitted.model.problem.estimation.segment)
+    if fitted.footing.segment_s is not None:
+        coarse = fitted.linear.recordings
+    longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
+    pairs = zip(coarse, _smoothers(fitted, max(FINE, longest // MOST_FINE)), strict=True)
+    tracks = tuple(_track(fitted, index, watch, names, *pair) for index, pair in enumerate(pairs))
     first = fitted.model.train[0].name
     numbers = fitted.model.space.numbers(fitted.theta, first)
     by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
@@ -74,7 +81,14 @@ def states_along(fitted: FittedModel, index: int) -> FloatArray:
     return result.states
 
 
-def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str], smoother: LinearRecording) -> Track:
+def _track(
+    fitted: FittedModel,
+    index: int,
+    watch: ca.Function,
+    names: list[str],
+    coarse: LinearRecording,
+    fine: LinearRecording,
+) -> Track:
     item = fitted.linear.program.experiments[index]
     numbers = fitted.model.space.numbers(fitted.theta, item.name)
     states = states_along(fitted, index)
@@ -86,11 +100,11 @@ def _track(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]
         return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in mech.drive.shafts}
 
     torque = {motor.name: table[f"{motor.name}.torque"] for motor in mech.drive.motors}
-    middle, missing = _missing(fitted, smoother)
-    return Track(item.grid.time, of("theta"), of("omega"), torque, middle, missing)
+    missing, finely = _missing(fitted, coarse), _missing(fitted, fine)
+    return Track(item.grid.time, of("theta"), of("omega"), torque, missing, finely)
 
 
-def _missing(fitted: FittedModel, smoother: LinearRecording) -> tuple[IntArray, dict[str, FloatArray]]:
+def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
     """Return the middle samples of segments and the mean torque that would close the gap behind each, by shaft."""
     mech, first = fitted.model.drive.mechanism, smoother.cut.first
     middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
@@ -107,15 +121,15 @@ def _missing(fitted: FittedModel, smoother: LinearRecording) -> tuple[IntArray, 
             ratio = speed_ratio(fitted.model, fitted.footing, name, shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
         missing[shaft.name] = torque
-    return middle, missing
+    return Missing(middle, missing)
 
 
-def _smoothers(fitted: FittedModel) -> tuple[LinearRecording, ...]:
+def _smoothers(fitted: FittedModel, samples: int) -> tuple[LinearRecording, ...]:
     """Return recordings cut into segments between which the states may jump, to see what torque would make them."""
-    if fitted.footing.segment_s is not None:
-        return fitted.linear.recordings
+    options = replace(fitted.model.problem.estimation, segment=samples)
+    model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options))
     items = fitted.linear.program.experiments
-    program = relaxed(fitted.model, items, 0.0, Squares())
+    program = relaxed(model, items, 0.0, Squares())
     start = Point(fitted.theta, program.suggested_nodes(fitted.theta))
     point = solve_nodes(program, start, SMOOTHING_STEPS)
     return tuple(LinearRecording(program, index, point) for index in range(len(items)))

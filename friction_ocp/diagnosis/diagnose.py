@@ -21,13 +21,11 @@ from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, show
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.diagnosis.worth import (
-    OF_REST,
     Key,
     gain,
     is_material,
     places,
     required,
-    samples,
     shortlist,
 )
 from friction_ocp.effects.registry import effects
@@ -38,8 +36,6 @@ from friction_ocp.statistics.execution import Execution
 
 SIGNIFICANCE = 0.01
 MOST_ROUNDS = 4
-PLAUSIBLE = 0.05
-"""Level of the score test where there is a gap for certain."""
 FINISHED, CLOSE = 2, 1.5
 """Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
 this factor."""
@@ -254,8 +250,7 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     found = crew.screened(places(current, names))
     power = excess(current.linear.rows, blocks)
     hopeful, gap = [item for item in found if item.gain >= HOPE * enough], power.significant(level)
-    large = OF_REST * max(current.objective - 0.5 * samples(current), 0.0)
-    chosen = shortlist(hopeful, PLAUSIBLE, large) if gap else shortlist(hopeful, level / max(len(found), 1))
+    chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
     rivals = _rivals(crew, chosen)
     able = [gain(current, item) >= enough and is_material(current, item.fitted) for item in rivals]
     choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.contrast import Contrast, contrast
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.diagnosis.screen import Screened, Start
@@ -19,6 +18,7 @@ from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gau
 from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.estimation.splicing import spliced
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
@@ -32,6 +32,9 @@ SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
 DETOUR = 0.05
 """Smoothing of the sign over the typical speed on the way around kinks."""
+HARDLY = (0.0005, 0.0002)
+"""The same for the nodes alone: an accelerometer sees every change of the sign, and wide smoothing leads astray."""
+NODE_STEPS = 8
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
 MOST_FOLDS = 4
@@ -50,8 +53,6 @@ class FittedModel:
     model: Model
     footing: Footing
     linear: LinearProgram
-    smooth: bool = True
-    """Whether the fit ended where nothing more is to be gained, not at a kink of exact friction."""
 
     @property
     def theta(self) -> FloatArray:
@@ -132,7 +133,7 @@ def polished(
     if not theta.size:
         return FittedModel(model, foot, linear_program(program, solve_nodes(program, point)))
     end = solve_gauss_newton(program, point, limits)
-    return FittedModel(model, foot, linear_program(program, end.point), end.smooth and end.converged)
+    return FittedModel(model, foot, linear_program(program, end.point))
 
 
 def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
@@ -177,24 +178,33 @@ def completed(fitted: FittedModel) -> FittedModel:
 
 
 def freed(fitted: FittedModel) -> FittedModel:
-    """Go on from an end at a kink: through friction with a smoothed sign, and back; elsewhere return what came in.
+    """Go on through friction with a smoothed sign, and back; keep what came in where that leads to nothing better.
 
-    A long free run far above the noise is caught by kinks that no single step shows.
+    A shaft that sticks in the model and slides in truth, or the reverse, is an end whose derivatives show nothing: it
+    stays there whatever the parameters are, and looks like a torque that the model lacks.
     """
-    caught = not fitted.smooth or (fitted.footing.segment_s is None and not _is_noise(fitted))
-    if not caught or not fitted.theta.size:
+    if not fitted.theta.size:
         return fitted
-    beyond = _around_kinks(fitted.model, fitted.linear.program, fitted.linear.point, WARM)
-    if beyond.objective >= fitted.objective:
-        return fitted
-    return replace(fitted, linear=linear_program(fitted.linear.program, beyond.point))
+    program, point = fitted.linear.program, fitted.linear.point
+    ends = [point, _around_kinks(fitted.model, program, point, WARM).point]
+    best = min(ends, key=program.objective)
+    moved = unstuck(fitted.model, program, best)
+    if moved is not best:
+        best = min((moved, solve_gauss_newton(program, moved, WARM).point), key=program.objective)
+    return fitted if best is point else replace(fitted, linear=linear_program(program, best))
 
 
-def _is_noise(fitted: FittedModel) -> bool:
-    """Whether the cost is no more than that of noise, the floors being off by their doubt."""
-    rows = fitted.linear.rows
-    samples = int(np.sum((rows.channel >= 0) & (rows.residual != 0.0)))
-    return fitted.objective < 0.5 * samples * (1.0 + FLOOR_DOUBT) ** 2
+def unstuck(model: Model, program: Program, point: Point) -> Point:
+    """Return the point with other nodes where friction with a hardly smoothed sign leads to better ones."""
+    best, cost = point, program.objective(point)
+    for width in HARDLY:
+        rounded = replace(program, width=width * model.speed_scale)
+        beyond = solve_nodes(program, solve_nodes(rounded, best, NODE_STEPS), NODE_STEPS)
+        trial = solve_nodes(program, spliced(program, best, beyond), STEPS_FROM_HELD_OUT)
+        after = program.objective(trial)
+        if after < cost - UNIMPORTANT:
+            best, cost = trial, after
+    return best
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:

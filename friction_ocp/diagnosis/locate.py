@@ -34,7 +34,7 @@ class Shape:
 
 def shape(clues: Clues, shaft: str) -> Shape | None:
     """Return the shape of the missing torque of a shaft; None where it is not known."""
-    torque = np.concatenate([track.missing.get(shaft, np.zeros(0)) for track in clues.tracks])
+    torque = np.concatenate([track.missing.torque.get(shaft, np.zeros(0)) for track in clues.tracks])
     if torque.size < 4 * BINS or not np.any(torque):
         return None
     variables = _variables(clues, shaft)
@@ -45,7 +45,7 @@ def shape(clues: Clues, shaft: str) -> Shape | None:
 
 def _variables(clues: Clues, shaft: str) -> Mapping[str, FloatArray]:
     def joined(series: list[FloatArray]) -> FloatArray:
-        parts = [values[track.middle] for values, track in zip(series, clues.tracks, strict=True)]
+        parts = [values[track.missing.middle] for values, track in zip(series, clues.tracks, strict=True)]
         return np.concatenate(parts)
 
     found = {

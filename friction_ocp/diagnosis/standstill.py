@@ -15,6 +15,10 @@ from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 STEPS = 15
 """Of the nodes of a recording from a start at rest."""
+BEGINNING = 20
+"""Samples from which a recording that does not start at rest is told."""
+MOVES = 5.0
+"""Travel in the beginning, or speed, over the noise of a channel from which it moves."""
 CLEAR = 5.0 * np.sqrt(5.0)
 """Step beyond those beside it, over the noise of a channel, that noise alone does not make: five deviations."""
 RARE = 0.05
@@ -43,6 +47,8 @@ def _settled_start(program: Program, point: Point) -> Point:
     best, cost = point, program.objective(point)
     measured = program.suggested_nodes(point.theta)[0][0]
     for columns in _stops(program):
+        if any(_moves(program, column) for column in columns):
+            continue
         start = point.nodes[0].copy()
         start[0] = measured
         start[0, columns] = 0.0
@@ -58,6 +64,28 @@ def _stops(program: Program) -> list[list[int]]:
     mech = program.drive.mechanism
     speeds = [len(mech.angle_groups) + k for k in range(len(mech.free_groups))]
     return [speeds] if len(speeds) == 1 else [speeds, *([one] for one in speeds)]
+
+
+def _moves(program: Program, column: int) -> bool:
+    """Whether a channel shows that the shafts behind a speed move before a recording of one begins."""
+    mech, item = program.drive.mechanism, program.experiments[0]
+    group = mech.free_groups[column - len(mech.angle_groups)]
+    for k, channel in enumerate(mech.drive.outputs):
+        values = item.measured[np.isfinite(item.measured[:, k]), k][:BEGINNING]
+        if mech.topology.group_of.get(channel.part) != group or values.size < BEGINNING:
+            continue
+        limit = MOVES * float(program.noise[k])
+        if channel.signal == "theta" and _goes_on(values, limit):
+            return True
+        if channel.signal == "omega" and abs(float(np.polyfit(np.arange(BEGINNING), values, 1)[1])) > limit:
+            return True
+    return False
+
+
+def _goes_on(angles: FloatArray, limit: float) -> bool:
+    """Whether a parabola through angles begins with a speed that makes half their travel or more."""
+    bend, slope, _ = np.polyfit(np.linspace(0.0, 1.0, angles.size), angles, 2)
+    return abs(slope) > limit and slope * (slope + bend) > 0.5 * (slope + bend) ** 2
 
 
 def without_jumps(item: Experiment, outputs: Sequence[Channel], noise: FloatArray) -> Experiment:

@@ -46,15 +46,15 @@ def prescribed(drive: Drive) -> set[str]:
     return {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
 
 
-def shortlist(found: Sequence[Screened], limit: float, large: float = np.inf) -> list[Screened]:
-    """Return candidates that are worth a refit.
+def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
+    """Return candidates that are worth a refit: those with a p-value below the limit, largest predicted gain first.
 
-    Where there is a gap for certain, a mere sign of significance is enough as the limit, or a `large` predicted gain,
-    which may come from a few blocks alone: the decision is made on recordings left out. Otherwise the limit is
-    corrected for the number of candidates (Bonferroni). Places compete: an effect that is worth it at one of them is
-    refitted at the others, too.
+    Where there is a gap for certain, whatever promises enough is tried: a gain that comes from a few blocks looks like
+    chance to a score test, and the decision is made on recordings left out. Otherwise the limit is corrected for the
+    number of candidates (Bonferroni). Places compete: an effect that is worth it at one of them is refitted at the
+    others, too.
     """
-    significant = [item for item in found if (item.p_value < limit or item.gain >= large) and item.gain > 0]
+    significant = [item for item in found if item.p_value < limit and item.gain > 0]
     if not significant:
         return []
     worth = WORTH_REFITTING * significant[0].gain

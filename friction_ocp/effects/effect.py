@@ -9,17 +9,32 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.parameters import Free
+
+median_filter: Any = _ndimage.median_filter  # its own types are incomplete
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 PEAKS = 4
 """Periods that are tried."""
-LINES = 600
+LINES, MOST_LINES = 600, 4000
 """Frequencies at which a spectrum is looked at."""
+NEIGHBOURS = 41
+"""Lines over which the level of a spectrum is told, itself in the middle."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """The torque that a model lacks along a recording, as the mean over each of some segments."""
+
+    middle: IntArray
+    """(segments,) the sample in the middle of each."""
+    torque: Mapping[str, FloatArray]
+    """By shaft (segments,) the torque if that shaft is where the model lacks one, N m."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +49,10 @@ class Track:
     """By shaft, rad/s."""
     torque: Mapping[str, FloatArray]
     """By motor, on its shaft, N m."""
-    middle: IntArray
-    """(segments,) samples at which the missing torque is known."""
-    missing: Mapping[str, FloatArray]
-    """By shaft (segments,) the torque that the model lacks if the shaft is where it lacks one, N m."""
+    missing: Missing
+    """Over the segments of the fit: what is slow, and little noise."""
+    finely: Missing
+    """Over a few samples each: what is fast, too, and more noise."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,9 @@ class Clues:
     """By shaft, N m: what moves it."""
     steady: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     """By shaft, rad/s: speeds at which static points were taken, where there are any."""
+    _known_periods: dict[tuple[str, str, bool, str | None], list[float]] = field(
+        default_factory=lambda: {}, init=False, repr=False, compare=False
+    )
 
     def speeds(self, shaft: str) -> FloatArray:
         """Return all speeds of a shaft, rad/s."""
@@ -72,23 +90,41 @@ class Clues:
         `against_motion` looks for a wave times the sign of the speed, `against_torque` times a motor's torque. Without
         a missing torque, harmonics of a turn, or parts of the longest recording.
         """
+        asked = (shaft, over, against_motion, against_torque)
+        if asked not in self._known_periods:
+            self._known_periods[asked] = self._periods(*asked)
+        return list(self._known_periods[asked])
+
+    def _periods(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[float]:
         place = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
         travel = max(float(np.ptp(one)) for one in place)
-        frequencies = np.linspace(0.5, LINES / 2.0, LINES) / max(travel, 1e-300)
-        power = np.zeros(LINES)
+        frequencies = self._frequencies(place, travel)
+        power = np.zeros(frequencies.size)
         for track, one in zip(self.tracks, place, strict=True):
-            if track.middle.size < 8:
+            at = track.finely.middle
+            if at.size < 8:
                 continue
-            factor = np.ones(track.middle.size)
+            factor = np.ones(at.size)
             if against_motion:
-                factor = np.sign(track.omega[shaft][track.middle])
+                factor = np.sign(track.omega[shaft][at])
             if against_torque is not None:
-                factor = track.torque[against_torque][track.middle]
-            power += _spectrum(one[track.middle] - one[0], track.missing[shaft], factor, frequencies)
+                factor = track.torque[against_torque][at]
+            power += _spectrum(one[at] - one[0], track.finely.torque[shaft], factor, frequencies)
         if not np.any(power):
             turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
             return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
         return [float(1.0 / frequencies[k]) for k in _peaks(power)]
+
+    def _frequencies(self, place: Sequence[FloatArray], travel: float) -> FloatArray:
+        """Return frequencies half a cycle apart over the travel, up to half a cycle per segment at typical speed."""
+        steps = [
+            np.sqrt(np.mean(np.diff(one[track.finely.middle]) ** 2))
+            for track, one in zip(self.tracks, place, strict=True)
+            if track.finely.middle.size > 1
+        ]
+        fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
+        lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
+        return np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
 
     def speed_quantiles(self, shaft: str, shares: Sequence[float]) -> list[float]:
         """Return speeds below which the shaft moves for the given shares of the time that it moves at all.
@@ -102,22 +138,24 @@ class Clues:
 
 def _spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
     """Return the share of squares that a wave of each frequency takes, at uneven places (Lomb 1976)."""
-    power = np.zeros(frequencies.size)
     plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
-    for k, frequency in enumerate(frequencies):
-        basis = factor[:, None] * np.column_stack(
-            [np.cos(2.0 * np.pi * frequency * place), np.sin(2.0 * np.pi * frequency * place)]
-        )
-        gram, pull = basis.T @ basis, basis.T @ plain
-        power[k] = float(pull @ np.linalg.lstsq(gram, pull, rcond=1e-9)[0])
-    return power
+    power: list[FloatArray] = []
+    for some in np.array_split(frequencies, max(1, frequencies.size // LINES)):
+        turns = 2.0 * np.pi * some[:, None] * place
+        basis = factor * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        gram, pull = basis @ basis.swapaxes(1, 2), basis @ plain
+        power.append(np.einsum("kp,kpq,kq->k", pull, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), pull))
+    return np.concatenate(power)
 
 
 def _peaks(power: FloatArray) -> list[int]:
-    """Return the places of the highest peaks, highest first."""
+    """Return the places of the highest peaks, and of those highest over the level around them, in turn."""
     inner = np.concatenate([[-np.inf], power, [-np.inf]])
     peaks = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
-    return [int(k) for k in peaks[np.argsort(-power[peaks])][:PEAKS]]
+    level = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
+    orders = [peaks[np.argsort(-height[peaks])] for height in (power, power / level)]
+    in_turn = [int(k) for pair in zip(*orders, strict=True) for k in pair]
+    return list(dict.fromkeys(in_turn))[:PEAKS]
 
 
 @dataclass(frozen=True)

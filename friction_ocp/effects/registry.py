@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from importlib.metadata import entry_points
 from typing import TypeVar
 
@@ -84,10 +85,12 @@ def register_effect(effect: Effect) -> Effect:
 def effects() -> dict[str, AbstractEffect]:
     """Return all effects by name, those of installed packages (entry point `friction_ocp.effects`) included."""
     known = {kind.name: kind() for kind in (*BUILT_IN, *_registered.values())}
-    for point in entry_points(group="friction_ocp.effects"):
-        kind: type[AbstractEffect] = point.load()
-        known[kind.name] = kind()
-    return known
+    return known | {kind.name: kind() for kind in _installed()}
+
+
+@cache
+def _installed() -> tuple[type[AbstractEffect], ...]:
+    return tuple(point.load() for point in entry_points(group="friction_ocp.effects"))
 
 
 def candidates(drive: Drive, names: list[str]) -> Iterator[tuple[AbstractEffect, str]]:

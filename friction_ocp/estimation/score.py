@@ -74,19 +74,19 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
     """Solve for the node states with the parameters held."""
     if program.without_nodes:
         return point
-    still = np.zeros_like(point.theta)
+    still, system = np.zeros_like(point.theta), program.linearise(point)
     objective, damping = program.objective(point), 1e-6
     for _ in range(iterations):
-        steps = reduce_system(program.linearise(point), damping).node_steps(still)
+        steps = reduce_system(system, damping).node_steps(still)
         trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))
         after = program.objective(trial)
-        if after < objective:
-            gained, point, objective = objective - after, trial, after
-            damping *= 0.1
-            if gained < 1e-9 * objective:
-                break
-        else:
+        if not after < objective:
             damping *= 100.0
+            continue
+        gained, point, objective = objective - after, trial, after
+        if gained < 1e-9 * objective:
+            break
+        system, damping = program.linearise(point), 0.1 * damping
     return point
 
 

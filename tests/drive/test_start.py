@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft
@@ -41,12 +43,17 @@ def test_bristles_start_in_steady_motion(omega: float) -> None:
     assert state["motor.friction.z"] == pytest.approx(0.1 / 200.0 if omega > 0 else -0.12 / 100.0, rel=rounded_sign)
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.02])
 @pytest.mark.parametrize("torque, acceleration", [(0.05, 0.0), (-0.04, 0.0), (0.09, 3.0)])
-def test_at_rest_a_bristle_holds_what_drives_the_shaft(torque: float, acceleration: float) -> None:
-    """Its deflection balances the torque that does not accelerate the shaft, with the stiffness of its side."""
+def test_at_rest_a_bristle_holds_what_drives_the_shaft(torque: float, acceleration: float, lag: float) -> None:
+    """Its deflection balances the torque that does not accelerate the shaft, with the stiffness of its side.
+
+    A motor that lags behind its command has caught up with it.
+    """
     friction = PlantFriction("lugre", (0.1, 0.12), 0.15, 1.0, sigma0=(200.0, 100.0))
     plant = Plant((PlantShaft("motor", 0.01, friction),), (), (PlantMotor("drive", "motor"),))
-    bench = Bench(drive_of(plant, {"drive.current": 0.0}))
+    drive = drive_of(plant, {"drive.current": 0.0})
+    bench = Bench(replace(drive, motors=(replace(drive.motors[0], lag=lag),)))
     bend = [acceleration if name == "motor.theta" else 0.0 for name in bench.stepped.output_names]
     still = [0.0] * len(bend)
     state = np.asarray(bench.stepped.start(still, still, bend, [torque], bench.numbers)).ravel()
