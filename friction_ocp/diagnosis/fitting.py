@@ -17,6 +17,7 @@ from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, with_drive
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.quadratic import bounded_step
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.splicing import spliced
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
@@ -42,6 +43,8 @@ MOST_FOLDS = 4
 UNIMPORTANT, NEARLY = 1.0, 0.3
 """Difference between what a step gains and what it predicts up to which it is believed: of the objective, where half a
 unit is a standard error, or a share of the prediction."""
+UNTOLD = 1e-8
+"""Information added to that of each parameter, as a share of it: a direction that nothing informs stays where it is."""
 SHRINK = 0.01
 """Share of the information of a left-out recording that is kept: where nothing else informs, a step stays small."""
 
@@ -257,7 +260,9 @@ def _step_without(fitted: FittedModel, left: BoolArray) -> tuple[FloatArray, flo
     rows, kept = fitted.linear.rows, ~left
     information = rows.jacobian[kept].T @ rows.jacobian[kept] + SHRINK * rows.jacobian[left].T @ rows.jacobian[left]
     pull = rows.jacobian[kept].T @ rows.residual[kept]
-    step = fitted.model.space.clip(fitted.theta - _solve(information, pull)) - fitted.theta
+    information[np.diag_indices_from(information)] *= 1.0 + UNTOLD
+    space, none = fitted.model.space, (np.zeros((0, pull.size)), np.zeros(0))
+    step = bounded_step(information, pull, space.lower - fitted.theta, space.upper - fitted.theta, *none)
     return step, -float(pull @ step) - 0.5 * float(step @ information @ step)
 
 
@@ -331,10 +336,3 @@ def raw_costs(program: Program, point: Point) -> FloatArray:
     return np.concatenate([program.loss.cost(errors).ravel(), *(0.5 * part**2 for part in parts)])
 
 
-def _solve(hessian: FloatArray, gradient: FloatArray) -> FloatArray:
-    """Solve with directions left alone that the other recordings say nothing about."""
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
-    told = values > 1e-8
-    along = vectors.T @ (gradient / scale)
-    return (vectors[:, told] @ (along[told] / values[told])) / scale

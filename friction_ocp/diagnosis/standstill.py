@@ -77,15 +77,21 @@ def _moves(program: Program, column: int) -> bool:
         limit = MOVES * float(program.noise[k])
         if channel.signal == "theta" and _goes_on(values, limit):
             return True
-        if channel.signal == "omega" and abs(float(np.polyfit(np.arange(BEGINNING), values, 1)[1])) > limit:
+        if channel.signal == "omega" and abs(_line(values, 1)[-1]) > limit:
             return True
     return False
 
 
 def _goes_on(angles: FloatArray, limit: float) -> bool:
     """Whether a parabola through angles begins with a speed that makes half their travel or more."""
-    bend, slope, _ = np.polyfit(np.linspace(0.0, 1.0, angles.size), angles, 2)
+    bend, slope, _ = _line(angles, 2)
     return abs(slope) > limit and slope * (slope + bend) > 0.5 * (slope + bend) ** 2
+
+
+def _line(values: FloatArray, degree: int) -> list[float]:
+    """Return the coefficients, highest first, of the polynomial through values over [0, 1]."""
+    found = np.asarray(np.polyfit(np.linspace(0.0, 1.0, values.size), values, degree), dtype=np.float64)
+    return [float(item) for item in found]
 
 
 def without_jumps(item: Experiment, outputs: Sequence[Channel], noise: FloatArray) -> Experiment:

@@ -20,7 +20,8 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
     """Return the state that measured motion suggests: no twist, bristles as steady motion or a balance has them."""
     q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    at = replace(at, lagged=commands(mech, at))
+    lagged = commands(mech, at)
+    at = replace(at, lagged=lagged)
     acceleration = _measured_accelerations(mech, dy, ddy)
     deflections = [_deflection(mech, shaft, at, acceleration) for shaft in mech.bristles]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
@@ -29,7 +30,7 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         pick(v, mech.free_groups),
         column(deflections),
         at.extra,
-        at.lagged,
+        lagged,
         ca.SX.zeros(len(mech.looping)),
         column(memory),
     )

@@ -14,7 +14,7 @@ import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.parameters import Free
 
-median_filter: Any = _ndimage.median_filter  # its own types are incomplete
+ndimage: Any = _ndimage  # its own types are incomplete
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -152,7 +152,7 @@ def _peaks(power: FloatArray) -> list[int]:
     """Return the places of the highest peaks, and of those highest over the level around them, in turn."""
     inner = np.concatenate([[-np.inf], power, [-np.inf]])
     peaks = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
-    level = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
+    level = np.maximum(ndimage.median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
     orders = [peaks[np.argsort(-height[peaks])] for height in (power, power / level)]
     in_turn = [int(k) for pair in zip(*orders, strict=True) for k in pair]
     return list(dict.fromkeys(in_turn))[:PEAKS]

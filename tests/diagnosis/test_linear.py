@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from diagnosis_cases import axis, write_case
+import yaml
+from diagnosis_cases import VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.blocks import blocks_of, score
+from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
@@ -42,6 +47,30 @@ def test_held_out_costs_exceed_those_of_the_fit(fitted: FittedModel) -> None:
     """A recording that took no part in a fit costs a little more than one that did, and of the same order."""
     costs = float(np.sum(held_out(fitted)))
     assert fitted.objective <= costs * (1.0 + 1e-6) < 1.2 * fitted.objective
+
+
+def test_recordings_are_held_out_of_fits_at_bounds(tmp_path: Path) -> None:
+    """Where a bound keeps a parameter from its best value, the others answer for what is left out as they can.
+
+    A step that is cut off at the bound without them would cost many times the fit.
+    """
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["friction"]["viscous"] |= {"guess": 3.0 * VISCOUS, "min": 2.0 * VISCOUS}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    fitted = fit_base(prepare(load_problem(path)))
+    assert fitted.values["motor.friction.viscous"] == pytest.approx(2.0 * VISCOUS)
+    costs = float(np.sum(held_out(fitted)))
+    assert fitted.objective <= costs * (1.0 + 1e-6) < 1.5 * fitted.objective
+
+
+def test_a_gap_in_a_few_blocks_counts(fitted: FittedModel) -> None:
+    """One block in which residuals are fifty times the noise is a gap, however unequal that makes the blocks."""
+    rows = fitted.linear.rows
+    blocks = blocks_of(rows)
+    assert excess(rows, blocks).p_value > 0.05
+    hit = np.where(blocks.of_row == 3, 50.0, 1.0) * rows.residual
+    assert excess(replace(rows, residual=hit), blocks).p_value < 1e-6
 
 
 def test_the_score_test_keeps_its_level(fitted: FittedModel) -> None:

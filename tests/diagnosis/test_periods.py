@@ -1,0 +1,33 @@
+"""Periods of the torque that a model lacks, from its spectrum over the angle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from friction_ocp.effects.effect import Clues, Missing, Track
+
+SAMPLES, INTERVAL, SEGMENT = 6000, 1e-3, 4
+SPEED, TEETH = 60.0, 24
+"""rad/s of the motor, and waves in a turn."""
+
+
+def clues(wave: float, drift: float) -> Clues:
+    """Return a motor that goes back and forth and lacks a wave over its angle beside a torque that drifts."""
+    rng = np.random.default_rng(3)
+    time = INTERVAL * np.arange(SAMPLES)
+    omega = SPEED * np.sin(2.0 * np.pi * time / 2.0)
+    theta = SPEED * (1.0 - np.cos(2.0 * np.pi * time / 2.0)) / np.pi
+    middle = np.arange(SEGMENT // 2, SAMPLES, SEGMENT)
+    torque = wave * np.cos(TEETH * theta[middle] + 0.4) + drift * np.sin(omega[middle] / SPEED)
+    missing = Missing(middle, {"motor": torque + 0.01 * rng.standard_normal(middle.size)})
+    track = Track(time, {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}, missing, missing)
+    return Clues((track,), {}, {"motor": 1.0})
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.0])
+def test_a_wave_is_found_beside_a_larger_drift(drift: float) -> None:
+    """Many waves a turn, over many turns: the period is among the first, to a cycle over the whole travel."""
+    found = clues(0.1, drift).periods("motor", "theta")
+    travel = 2.0 * SPEED / np.pi
+    assert min(abs(1.0 / period - TEETH / (2.0 * np.pi)) for period in found[:2]) < 1.0 / travel
