@@ -334,5 +334,3 @@ def raw_costs(program: Program, point: Point) -> FloatArray:
         suggested, _ = program.measured_states(item, point.theta, cut.first[cut.tied])
         parts.append((cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel())
     return np.concatenate([program.loss.cost(errors).ravel(), *(0.5 * part**2 for part in parts)])
-
-
