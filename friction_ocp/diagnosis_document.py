@@ -12,7 +12,7 @@ from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.select import Rival, probabilities
@@ -196,7 +196,8 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
         component = last.screened[0].component
     slow = [{"component": item.component, "ratio": item.ratio, "p_value": item.p_value} for item in diagnosis.slow]
     return {
-        "significant": diagnosis.left_over,
+        "significant": diagnosis.unexplained,
+        "carries_over": diagnosis.carries_over,
         "component": component,
         "ratio": diagnosis.remainder.ratio,
         "slow_torque": slow,
@@ -205,7 +206,7 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     problem, model = diagnosis.problem, diagnosis.base.model
-    closed = shrink(diagnosis.before, diagnosis.after, problem.estimation.seed)
+    closed = diagnosis.closed
     sources = {floor.source for floor in model.floors.values()}
     return {
         "evaluated_on": [use.name for use in (problem.validation or problem.train)],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -12,9 +13,9 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Crew, Tell, blocks_like, open_bench
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.excess import Excess, excess
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
-from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
+from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
 from friction_ocp.diagnosis.reading import explains_more, innovations, other_reading, with_additions
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown, with_refused
@@ -89,6 +90,25 @@ class Diagnosis:
         slow = any(item.p_value * len(self.slow) < self.level for item in self.slow)
         return self.remainder.significant(self.level) or (slow and not self.accepted)
 
+    @cached_property
+    def closed(self) -> Shrink:
+        """How far the gap shrinks on recordings that took no part."""
+        return shrink(self.before, self.after, self.problem.estimation.seed)
+
+    @property
+    def carries_over(self) -> bool:
+        """Whether what was added shrinks the gap on recordings that took no part, or leaves nothing of it there.
+
+        They take no part in choosing; but what helps where it was fitted alone explains nothing.
+        """
+        doubt = (1.0 + FLOOR_DOUBT) ** 2 - 1.0
+        return not self.accepted or self.after.excess() <= doubt or self.closed.interval95[0] > 0.0
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether more than noise is left, where models were fitted or elsewhere."""
+        return self.left_over or not self.carries_over
+
     @property
     def rest(self) -> str | None:
         """The component where what is left sits: where a slow torque explains most of it."""
@@ -114,7 +134,7 @@ class Diagnosis:
         """explained, no_gap, unknown_effect or undecided."""
         if not self.gap:
             return "no_gap"
-        if self.left_over:
+        if self.unexplained:
             return "unknown_effect"
         return "undecided" if self.alias_sets else "explained"
 

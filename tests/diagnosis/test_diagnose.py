@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnosis_cases import axis, write_case
+from diagnosis_cases import axis, record, write_case
 
 from friction_ocp.cli import main
+from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.estimation.estimate import simulate
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
 
 RISE, STRIBECK_SPEED = 0.05, 6.0
 STRIBECK = {"law": "stribeck", "tau_s": 0.1 + RISE, "omega_s": STRIBECK_SPEED}
@@ -85,3 +87,14 @@ def test_a_model_that_lacks_nothing_has_no_gap(tmp_path: Path) -> None:
     result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert result["verdict"] == "no_gap"
     assert result["accepted"] == [] and result["biased_parameters"] == []
+
+
+def test_what_does_not_carry_over_explains_nothing(tmp_path: Path) -> None:
+    """Where the recording left out is of a drive without the effect, adding it shrinks no gap there."""
+    path = write_case(tmp_path, axis(**STRIBECK))
+    write_recording(record(axis(), "c", 12), tmp_path / "c.h5")
+    found = diagnose(load_problem(path))
+    assert [key[0] for key in found.accepted] == ["stribeck"]
+    assert not found.left_over
+    assert not found.carries_over
+    assert found.verdict == "unknown_effect"
