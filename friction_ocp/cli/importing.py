@@ -21,8 +21,9 @@ def add_commands(commands: Any) -> None:
 
 
 def _import(options: argparse.Namespace) -> int:
-    from friction_ocp.recording.hdf5 import write_recording
-    from friction_ocp.recording.import_recording import import_recording, inspect_file
+    from friction_ocp.recording.hdf5 import write_recording, write_static_points
+    from friction_ocp.recording.import_recording import import_file, inspect_file
+    from friction_ocp.recording.recording import Recording
 
     if options.inspect:
         print(inspect_file(options.file))
@@ -32,6 +33,11 @@ def _import(options: argparse.Namespace) -> int:
         raise FrictionOcpError(
             [Finding("import", f"--{name} is missing", remedy="see friction-ocp import --help") for name in missing]
         )
-    write_recording(import_recording(options.file, options.map), options.out)
-    print(f"Recording: {options.out}")
+    found = import_file(options.file, options.map)
+    if isinstance(found, Recording):
+        write_recording(found, options.out)
+        print(f"Recording: {options.out}")
+    else:
+        write_static_points(found, options.out)
+        print(f"Static points: {options.out}")
     return DONE

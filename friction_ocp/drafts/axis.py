@@ -1,4 +1,4 @@
-"""What a draft says about an axis, and the templates: typical numbers of four kinds of drive."""
+"""What a draft says about an axis, and the templates: typical numbers of five kinds of drive."""
 
 from __future__ import annotations
 
@@ -36,6 +36,8 @@ class Axis:
     gravity: tuple[float, float] | None = None
     """Torque and phase of an unbalanced load."""
     linear: bool = False
+    held: bool = False
+    """Whether something else makes the load move, and what that takes is measured; sizes come from the recordings."""
     notes: tuple[str, ...] = ()
 
     @property
@@ -98,6 +100,17 @@ TEMPLATES: Mapping[str, Axis] = {
         linear=True,
         notes=("Ball screw: ratio = 2 pi / lead in rad/m; here a lead of 10 mm.",),
     ),
+    "test_bench": Axis(
+        kind="test bench",
+        motor_inertia=None,
+        load="sample",
+        load_inertia=1.0e-3,
+        held=True,
+        notes=(
+            "Tribometer or dynamometer: the motion is prescribed, and the torque or force that it takes is measured.",
+            "Sizes are those of the recordings.",
+        ),
+    ),
 }
 """By name on the command line."""
 
@@ -112,18 +125,15 @@ def template(name: str) -> Axis:
 
 def drive_section(axis: Axis, driven_by: str) -> dict[str, Any]:
     """Return the section `drive` of a draft; what is not certain has a guess and wide bounds."""
+    if axis.held:
+        return {"shafts": [_load(axis)]}
     motor: dict[str, Any] = {"name": "motor", "shaft": axis.motor_shaft}
     if driven_by != "torque":
         motor["torque_constant"] = float(axis.torque_constant)
     if driven_by == "voltage":
         motor["resistance"] = _guess(axis.resistance or 1.0)
-    load: dict[str, Any] = {"name": axis.load, "inertia": _guess(axis.load_inertia)}
-    if axis.linear:
-        load["motion"] = "linear"
-    if axis.gravity is not None:
-        load["gravity"] = {"torque": _guess(axis.gravity[0]), "phase": float(axis.gravity[1])}
+    load = _load(axis)
     if axis.motor_inertia is None:
-        load["friction"] = _friction(axis.law, axis.tau_c, axis.viscous)
         return {"motors": [motor], "shafts": [load]}
     if axis.load_friction is not None:
         load["friction"] = _friction("coulomb_viscous", *axis.load_friction)
@@ -133,6 +143,17 @@ def drive_section(axis: Axis, driven_by: str) -> dict[str, Any]:
     if axis.stiffness is not None:
         joint |= {"stiffness": _guess(axis.stiffness), "damping": _guess(1e-3 * axis.stiffness)}
     return {"motors": [motor], "shafts": [shaft, load], "transmissions": [joint]}
+
+
+def _load(axis: Axis) -> dict[str, Any]:
+    load: dict[str, Any] = {"name": axis.load, "inertia": _guess(axis.load_inertia)}
+    if axis.linear:
+        load["motion"] = "linear"
+    if axis.gravity is not None:
+        load["gravity"] = {"torque": _guess(axis.gravity[0]), "phase": float(axis.gravity[1])}
+    if axis.motor_inertia is None:
+        load["friction"] = _friction(axis.law, axis.tau_c, axis.viscous)
+    return load
 
 
 def constraints(axis: Axis) -> list[str]:

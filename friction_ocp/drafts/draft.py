@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ def init(
     """
     axis = source if isinstance(source, Axis) else _axis(str(source), joint)
     recorded = recordings_of(Path(recordings), axis)
+    axis = replace(axis, **recorded.sizes)
     write_draft(axis, recorded, Path(path))
     return recorded
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from friction_ocp.drafts.axis import Axis
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -18,6 +20,7 @@ _SUPPLY = re.compile(r"supply|bus|battery|dc_?link", re.IGNORECASE)
 _ENABLE = re.compile(r"enable", re.IGNORECASE)
 _MOTOR = re.compile(r"motor|rotor|input", re.IGNORECASE)
 _VALIDATION = re.compile(r"valid|check|test|hold_?out", re.IGNORECASE)
+_TAKEN = re.compile(r"fric|drag|tang|torque|drive", re.IGNORECASE)
 _SIGNALS = {"rad": "theta", "rad/s": "omega", "rad/s^2": "alpha", "m": "theta", "m/s": "omega", "m/s^2": "alpha"}
 _EFFORTS = {"A": "current", "N m": "torque", "N": "torque", "V": "voltage"}
 
@@ -31,9 +34,11 @@ class Recorded:
     channels: Mapping[str, Mapping[str, Any]]
     """Section `channels` of a draft."""
     driven_by: str
-    """current, torque or voltage."""
+    """current, torque, voltage, or the motion itself."""
     left_out: tuple[str, ...]
     """Channels whose meaning is not told by name and unit, or that a draft does not need."""
+    sizes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """What the recordings tell about the axis of a test bench: whether it is linear, its friction and inertia."""
 
 
 def recordings_of(folder: Path, axis: Axis) -> Recorded:
@@ -45,10 +50,15 @@ def recordings_of(folder: Path, axis: Axis) -> Recorded:
         remedy = "turn logs into recordings with friction-ocp import"
         raise FrictionOcpError([*spoilt, Finding(str(folder), "there are no recordings", "*.h5", remedy)])
     units = _common(found)
-    channels, driven_by = _channels(units, axis, folder)
+    sizes: dict[str, Any] = {}
+    if axis.held:
+        channels, driven_by = _held_channels(units, axis, folder), "motion"
+        sizes = _sizes(found[0][1], channels)
+    else:
+        channels, driven_by = _channels(units, axis, folder)
     train, validation = _split([path for path, _ in found])
     left_out = tuple(sorted({name for _, item in found for name in item.channels} - channels.keys()))
-    return Recorded(train, validation, channels, driven_by, left_out)
+    return Recorded(train, validation, channels, driven_by, left_out, sizes)
 
 
 def _read_all(folder: Path) -> tuple[list[tuple[Path, Recording]], list[Finding]]:
@@ -73,11 +83,16 @@ def _common(found: Sequence[tuple[Path, Recording]]) -> dict[str, str]:
 
 
 def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[str, dict[str, Any]], str]:
-    efforts = [(name, _EFFORTS[unit]) for name, unit in units.items() if unit in _EFFORTS and not _SUPPLY.search(name)]
+    force = "N" if axis.linear and axis.motor_inertia is None else "N m"
+    able = {unit: signal for unit, signal in _EFFORTS.items() if signal != "torque" or unit == force}
+    efforts = [(name, able[unit]) for name, unit in units.items() if unit in able and not _SUPPLY.search(name)]
     if not efforts:
-        what = f"no channel drives the motor: they are {', '.join(f'{name} ({unit})' for name, unit in units.items())}"
-        remedy = "write a controller and its reference into the problem, as in problems/xl330"
-        raise FrictionOcpError(Finding(str(folder), what, "a current (A), torque (N m, N) or voltage (V)", remedy))
+        what = f"no channel drives the motor: they are {_listed(units)}"
+        remedy = (
+            "write a controller and its reference into the problem, as in problems/xl330, or take the template "
+            "test_bench where the force or torque that a motion takes was measured"
+        )
+        raise FrictionOcpError(Finding(str(folder), what, f"a current (A), torque ({force}) or voltage (V)", remedy))
     measured = [item for item in efforts if not _REFERENCE.search(item[0])] or efforts
     order = ("current", "torque", "voltage")
     driving, driven_by = min(measured, key=lambda item: order.index(item[1]))
@@ -90,9 +105,45 @@ def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[
         elif unit == "1" and _ENABLE.search(name):
             channels[name] = {"measures": "motor.enable", "role": "input", "hold": "zero"}
     if not any(item["measures"].split(".")[-1] in ("theta", "omega", "alpha") for item in channels.values()):
-        what = f"no channel sees the motion: they are {', '.join(f'{name} ({unit})' for name, unit in units.items())}"
+        what = f"no channel sees the motion: they are {_listed(units)}"
         raise FrictionOcpError(Finding(str(folder), what, "an angle, a speed or an acceleration"))
     return channels, driven_by
+
+
+def _held_channels(units: Mapping[str, str], axis: Axis, folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the motion, the speed before the angle, as what drives a test bench, and the effort as what it takes."""
+    motions = [(name, _SIGNALS[unit]) for name, unit in units.items() if unit in ("rad/s", "m/s", "rad", "m")]
+    moved = min((item for item in motions if not _REFERENCE.search(item[0])), key=lambda item: item[1], default=None)
+    force = "N m" if moved is None or units[moved[0]].startswith("rad") else "N"
+    efforts = sorted((name for name, unit in units.items() if unit == force), key=lambda name: not _TAKEN.search(name))
+    if moved is None or not efforts:
+        what = f"a motion and what it takes are not both there: they are {_listed(units)}"
+        raise FrictionOcpError(Finding(str(folder), what, "an angle or a speed, and a torque; for a length, a force"))
+    return {
+        moved[0]: {"measures": f"{axis.load}.{moved[1]}", "role": "input"},
+        efforts[0]: {"measures": f"{axis.load}.drive_torque"},
+    }
+
+
+def _sizes(recording: Recording, channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what a test bench is like: friction as large as the effort, an inertia that takes a tenth of it."""
+    motion, effort = (recording.channels[name] for name in channels)
+    moves = motion.unit.endswith("/s")
+    speed = motion.values if moves else np.gradient(motion.values, motion.time)
+    way = np.cumsum(np.nan_to_num(speed) * np.gradient(motion.time)) if moves else motion.values
+    level = float(np.nanmedian(np.abs(effort.values))) or 1.0
+    fast = float(np.nanquantile(np.abs(speed), 0.9)) or 1.0
+    quick = fast**2 / (0.5 * float(np.nanmax(way) - np.nanmin(way)) or 1.0)
+    return {
+        "linear": motion.unit.startswith("m"),
+        "tau_c": level,
+        "viscous": 0.1 * level / fast,
+        "load_inertia": 0.1 * level / quick,
+    }
+
+
+def _listed(units: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} ({unit})" for name, unit in units.items())
 
 
 def _fits(unit: str, name: str, axis: Axis) -> bool:

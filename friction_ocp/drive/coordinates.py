@@ -8,6 +8,8 @@ import casadi as ca
 
 from friction_ocp.drive.mechanism import Mechanism, column
 
+_ORDERS = ("theta", "omega", "alpha")
+
 
 def group_angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
     """Return the angles of all groups from those that are states; the others are inputs."""
@@ -24,16 +26,31 @@ def group_speeds(mech: Mechanism, speeds: ca.SX) -> ca.SX:
 
 
 def prescribed_motion(mech: Mechanism, group: int, signal: str) -> Any:
-    """Return the angle or speed of a driven group, in terms of its first shaft."""
+    """Return the angle, speed or acceleration of a driven group, in terms of its first shaft."""
     channel = next(
         item
         for item in mech.drive.inputs
         if item.signal == mech.prescribed[group] and mech.topology.group_of.get(item.part) == group
     )
     ratio = mech.topology.speed_ratio[channel.part]
-    if signal == "omega" and channel.signal == "theta":
-        return mech.inputs[f"{channel.name}'"] / channel.gain / ratio
-    return (mech.inputs[channel.name] - channel.offset) / channel.gain / ratio
+    order = _ORDERS.index(signal) - _ORDERS.index(channel.signal)
+    value = mech.inputs[channel.name + order * "'"]
+    return (value if order else value - channel.offset) / channel.gain / ratio
+
+
+def group_accelerations(mech: Mechanism, free: ca.SX) -> ca.SX:
+    """Return `free`, the accelerations of all groups by the torques on them, with those of driven groups in place.
+
+    The acceleration of a driven group is 0 where no output sees it.
+    """
+    groups = range(len(mech.topology.roots))
+    return column([_driven_acceleration(mech, g) if g in mech.prescribed else free[g] for g in groups])
+
+
+def _driven_acceleration(mech: Mechanism, group: int) -> Any:
+    channels = [item for item in mech.drive.inputs if mech.topology.group_of.get(item.part) == group]
+    seen = any(item.name + ("''" if item.signal == "theta" else "'") in mech.inputs for item in channels)
+    return prescribed_motion(mech, group, "alpha") if seen else 0.0
 
 
 def pick(vector: ca.SX, groups: tuple[int, ...]) -> ca.SX:

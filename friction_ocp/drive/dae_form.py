@@ -12,7 +12,8 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.dae import Dae, Variable
-from friction_ocp.drive.coordinates import group_angles, group_speeds
+from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds
+from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
@@ -71,11 +72,13 @@ def dae(drive: Drive, width: float) -> Dae:
     torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
-    acceleration = column([_acceleration(mech, at, g, torques, friction) for g in range(len(mech.topology.roots))])
+    free = column([_acceleration(mech, at, g, torques, friction) for g in range(len(mech.topology.roots))])
+    acceleration = group_accelerations(mech, free)
+    holding = holding_torques(mech, at, acceleration, torques, friction)
     found = column([through_joint(mech, joint, at, acceleration, torques, friction) for joint in mech.loaded_joints()])
     turning = [at.v[g] for g in mech.angle_groups]
     speeding = [acceleration[g] for g in mech.free_groups]
-    outputs = [recorded(mech, channel, at, acceleration) for channel in mech.drive.outputs]
+    outputs = [recorded(mech, channel, at, acceleration, holding) for channel in mech.drive.outputs]
     return Dae(
         states=_states(mech, symbols),
         algebraic=_algebraic(mech, symbols),
@@ -168,8 +171,9 @@ def _inputs(mech: Mechanism, symbols: _Symbols) -> tuple[Variable, ...]:
 def _input_unit(drive: Drive, name: str) -> str:
     if name == TIME:
         return si_unit("time")
-    measures = next(channel.measures for channel in drive.inputs if channel.name == name.removesuffix("'"))
-    return signal_unit(drive, measures) + ("/s" if name.endswith("'") else "")
+    measures = next(channel.measures for channel in drive.inputs if channel.name == name.rstrip("'"))
+    order = len(name) - len(name.rstrip("'"))
+    return signal_unit(drive, measures) + ("", "/s", "/s^2")[order]
 
 
 def _parameters(drive: Drive, mech: Mechanism) -> tuple[Variable, ...]:

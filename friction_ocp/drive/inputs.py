@@ -8,6 +8,7 @@ import casadi as ca
 
 from friction_ocp.drive.parts import Channel, Drive, Shaft
 from friction_ocp.drive.topology import Topology
+from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.parameters import is_off
 
@@ -17,15 +18,15 @@ time axis in the file, which no channel can have."""
 
 
 def input_symbols(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
-    """Return a symbol for every input: channels, slopes of prescribed angles as `<name>'`, and the time.
+    """Return a symbol for every input: channels, time derivatives of prescribed motion as `<name>'`, and the time.
 
     Raises FrictionOcpError where a live term lacks what it needs.
     """
     inputs: dict[str, ca.SX] = {}
     for channel in drive.inputs:
-        inputs[channel.name] = ca.SX.sym(channel.name)
-        if _needs_slope(channel, structure):
-            inputs[f"{channel.name}'"] = ca.SX.sym(f"{channel.name}'")
+        for order in range(1 + _derivatives(channel, drive, structure)):
+            name = channel.name + order * "'"
+            inputs[name] = ca.SX.sym(name)
     if any(_depends_on_time(shaft) for shaft in drive.shafts) or any(map(drive.clock_of, drive.outputs)):
         inputs[TIME] = ca.SX.sym(TIME)
     if findings := list(warm_up_faults(drive)):
@@ -33,8 +34,24 @@ def input_symbols(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
     return inputs
 
 
-def _needs_slope(channel: Channel, structure: Topology) -> bool:
-    return channel.part in structure.group_of and channel.signal == "theta"
+def _derivatives(channel: Channel, drive: Drive, structure: Topology) -> int:
+    """Return how many time derivatives of an input the drive needs: a speed, and an acceleration where it is seen."""
+    if channel.part not in structure.group_of or channel.signal not in ("theta", "omega"):
+        return 0
+    accelerated = structure.group_of[channel.part] in _seen_groups(drive, structure)
+    return (channel.signal == "theta") + accelerated
+
+
+def _seen_groups(drive: Drive, structure: Topology) -> set[int]:
+    """Return the groups of which an output sees the acceleration, or a torque that depends on it."""
+    shaft_of = {motor.name: motor.shaft for motor in drive.motors}
+    seen: set[int] = set()
+    for channel in drive.outputs:
+        if channel.part in structure.group_of and channel.signal in ("alpha", DRIVE_TORQUE):
+            seen.add(structure.group_of[channel.part])
+        elif channel.part in shaft_of and channel.signal in ("torque", "current"):
+            seen.add(structure.group_of[shaft_of[channel.part]])
+    return seen
 
 
 def _depends_on_time(shaft: Shaft) -> bool:

@@ -14,6 +14,7 @@ from typing import Any
 
 import casadi as ca
 
+from friction_ocp.drive.coordinates import group_accelerations
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
 from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.drive.torques import applied_torques, elastic_torque
@@ -53,6 +54,10 @@ class Kick:
     """(groups,) mean speeds over the step."""
     load: dict[str, Any]
     """Torque through each transmission that friction depends on, on its output side."""
+    torques: dict[str, Any]
+    """Torque on each shaft other than friction and torque through rigid joints."""
+    friction: dict[str, Any]
+    """Friction torque on each shaft."""
     unknown: Unknown | None = None
     """The torques in whose symbols `v` and `load` are written; None where they are not."""
 
@@ -80,11 +85,27 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     load = {item.name: elastic_torque(mech, item, step.at, corner) for item in mech.topology.elastic}
     load |= {joint.name: symbols[k] for k, joint in enumerate(joints)}
     v, mean, friction = _solve(mech, step, torques, stiffening, load)
+    friction |= _prescribed_friction(mech, step, load)
     if not joints:
-        return Kick(v, mean, load)
-    acceleration = (v - step.v) / step.h
+        return Kick(v, mean, load, torques, friction)
+    acceleration = group_accelerations(mech, (v - step.v) / step.h)
     found = column([through_joint(mech, joint, step.at, acceleration, torques, friction) for joint in joints])
-    return Kick(v, mean, load, Unknown(symbols, found))
+    return Kick(v, mean, load, torques, friction, Unknown(symbols, found))
+
+
+def _prescribed_friction(mech: Mechanism, step: Step, load: dict[str, Any]) -> dict[str, Any]:
+    """Return the friction torque on the shafts whose motion is an input, at the speeds of the step."""
+    friction: dict[str, Any] = {}
+    for group in mech.prescribed:
+        for name in mech.topology.members(group):
+            shaft = mech.drive.shaft(name)
+            omega, transmitted = mech.shaft_speed(name, step.at), transmitted_torque(mech, shaft, load)
+            element = shaft.friction.under(mech.surroundings(shaft, step.at))
+            if name in step.bristle:
+                friction[name], _ = element.bristle_torque(omega, step.bristle[name], transmitted)
+            else:
+                friction[name] = element.torque(omega, transmitted, step.width[group])
+    return friction
 
 
 def _applied(mech: Mechanism, step: Step) -> tuple[dict[str, Any], list[Any]]:

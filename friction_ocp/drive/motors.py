@@ -16,18 +16,18 @@ def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque that current makes in a motor, 0 while it is not enabled; cogging is apart from it."""
     if mech.driving_signal(motor) == "torque":
         torque = _enabled(mech, motor, _driving(mech, motor, motion))
-        return _saturated(motor, torque, torque / motor.torque_constant) * _ripple(mech, motor, motion)
+        return _saturated(motor, torque, torque / motor.torque_constant) * torque_ripple_factor(mech, motor, motion)
     current = motor_current(mech, motor, motion)
     if current is None:
         return 0.0
-    return _saturated(motor, motor.torque_constant * current, current) * _ripple(mech, motor, motion)
+    return _saturated(motor, motor.torque_constant * current, current) * torque_ripple_factor(mech, motor, motion)
 
 
 def _saturated(motor: Motor, torque: Any, current: Any) -> Any:
     return torque if motor.saturation is None else torque / sqrt(1.0 + motor.saturation * current**2)
 
 
-def _ripple(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+def torque_ripple_factor(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the factor on torque and back-EMF at the angle of the motor."""
     if motor.torque_ripple is None:
         return 1.0
@@ -60,7 +60,7 @@ def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
 
 def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     speed = mech.shaft_speed(motor.shaft, motion)
-    return motor.torque_constant * _ripple(mech, motor, motion) * speed
+    return motor.torque_constant * torque_ripple_factor(mech, motor, motion) * speed
 
 
 def motor_voltage(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:

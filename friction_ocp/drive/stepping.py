@@ -13,7 +13,8 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import apply_tick, compute_tick
-from friction_ocp.drive.coordinates import group_angles, group_speeds, pick
+from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds, pick
+from friction_ocp.drive.holding import drive_torque, holding_effort, holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
@@ -30,10 +31,13 @@ from friction_ocp.drive.motors import (
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.drive.start import start_state
 from friction_ocp.drive.torques import loops_after
+from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.friction.smoothing import expm1, tanh, where
 
 INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
+
+NOTHING_HELD: Mapping[int, Any] = {}
 
 NO_LAG = 1.0 / 40.0
 """Share of a step below which a lag has decayed within it to less than the rounding of doubles."""
@@ -204,7 +208,9 @@ def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
     bristle = mech.deflections(state.bristle)
     instant = INSTANT * h
     done = implicit_kick(mech, Step(instant, v, at, bristle, width))
-    value = column([recorded(mech, channel, at, (done.v - v) / instant) for channel in mech.drive.outputs])
+    acceleration = group_accelerations(mech, (done.v - v) / instant)
+    holding = holding_torques(mech, at, acceleration, done.torques, done.friction)
+    value = column([recorded(mech, channel, at, acceleration, holding) for channel in mech.drive.outputs])
     return _Expression(value, () if done.unknown is None else (done.unknown,))
 
 
@@ -226,12 +232,14 @@ def _observed_lags(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
     return replace(at, lagged=wanted + behind * (at.lagged - wanted))
 
 
-def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> Any:
+def recorded(
+    mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX, holding: Mapping[int, Any] = NOTHING_HELD
+) -> Any:
     """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives.
 
-    What a clock of its own is fast by is a delay, too.
+    What a clock of its own is fast by is a delay, too. `holding` are the torques that prescribe motions, by group.
     """
-    value, rate, curvature = _signal(mech, channel, at, acceleration)
+    value, rate, curvature = _signal(mech, channel, at, acceleration, holding)
     delay, clock = channel.delay, mech.drive.clock_of(channel)
     if clock is not None:
         delay = delay + clock.offset + clock.drift * mech.inputs[TIME]
@@ -239,7 +247,9 @@ def recorded(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX)
     return channel.gain * delayed + channel.offset
 
 
-def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) -> tuple[Any, Any, Any]:
+def _signal(
+    mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX, holding: Mapping[int, Any]
+) -> tuple[Any, Any, Any]:
     if channel.signal in ("theta", "omega", "alpha"):
         theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at)
         alpha = mech.shaft_acceleration(channel.part, at, acceleration)
@@ -247,7 +257,11 @@ def _signal(mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX) 
             theta, omega, alpha = channel.eccentricity.seen((theta, omega, alpha))
         signals = {"theta": (theta, omega, alpha), "omega": (omega, alpha, 0.0), "alpha": (alpha, 0.0, 0.0)}
         return signals[channel.signal]
+    if channel.signal == DRIVE_TORQUE:
+        return drive_torque(mech, channel.part, at, holding), 0.0, 0.0
     motor = mech.drive.motor(channel.part)
+    if mech.topology.group_of[motor.shaft] in holding and mech.driving_signal(motor) is None:
+        return holding_effort(mech, motor, at, holding, channel.signal), 0.0, 0.0
     value = {
         "current": motor_current,
         "torque": motor_torque,

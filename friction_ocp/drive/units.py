@@ -8,7 +8,10 @@ from friction_ocp.parameters import Leaf
 from friction_ocp.quantities import si_unit
 
 SHAFT_SIGNALS = {"theta": "angle", "omega": "speed", "alpha": "acceleration"}
-"""What can be measured of a shaft, and the kind of quantity it is."""
+"""What can be measured of the motion of a shaft, and the kind of quantity it is."""
+
+DRIVE_TORQUE = "drive_torque"
+"""What drives a shaft whose motion is prescribed: the friction force of a tribometer, the torque of a dynamometer."""
 
 MOTOR_SIGNALS = {
     "current": "current",
@@ -60,6 +63,8 @@ def signal_unit(drive: Drive, measures: str) -> str:
         return si_unit(REFERENCE_SIGNALS[signal], feedback_motion(drive))
     if part in shafts and signal in SHAFT_SIGNALS:
         return si_unit(SHAFT_SIGNALS[signal], shafts[part])
+    if part in shafts and signal == DRIVE_TORQUE:
+        return si_unit("torque", shafts[part])
     if part in motors and signal in MOTOR_SIGNALS:
         return si_unit(MOTOR_SIGNALS[signal], motors[part])
     raise FrictionOcpError(Finding(measures, "the drive has no such signal"))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.parameters import Free
 
 ndimage: Any = _ndimage  # its own types are incomplete
@@ -259,6 +260,9 @@ def channel(drive: Drive, name: str) -> Channel:
 
 
 def moving_shafts(drive: Drive) -> list[Shaft]:
-    """Return the shafts whose motion is not prescribed by an input."""
+    """Return the shafts whose motion is not prescribed by an input, and those of which an output sees what it takes."""
     driven = {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
+    seen = {item.part for item in drive.outputs}
+    held = {motor.shaft for motor in drive.motors if seen & {motor.name}}
+    driven -= held | {item.part for item in drive.outputs if item.signal == DRIVE_TORQUE}
     return [shaft for shaft in drive.shafts if shaft.name not in driven]

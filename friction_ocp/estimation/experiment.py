@@ -6,15 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
+from friction_ocp.drive.holding import undetermined_at_rest
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse
-from friction_ocp.recording.conditioning import smooth_motion
+from friction_ocp.recording.conditioning import high_frequency_noise, smooth_motion
 from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray, Grid, InputSignal, build_grid
+
+STILL, NOISE_OF_REST = 1e-3, 3.0
+"""Share of the greatest speed, and standard deviations of its noise, up to which a prescribed speed has no sign."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,8 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
     laid = _model_inputs(signals, inputs, drive, _clock(recording))
     grid = build_grid(samples, laid, drive.mechanism.drive.controller, max_step)
     columns = [_on_nodes(grid, use, channel.name) for channel in outputs]
+    for k, speed_of in undetermined_at_rest(drive.mechanism).items():
+        columns[k] = np.where(_near_rest(grid, drive, speed_of, use), np.nan, columns[k])
     motions = [_smooth(grid, use, channel.name) for channel in outputs]
     return Experiment(
         name=use.name,
@@ -97,18 +104,31 @@ def _clock(recording: Recording) -> InputSignal:
 def _model_inputs(
     signals: list[InputSignal], inputs: tuple[Channel, ...], drive: SteppedDrive, clock: InputSignal
 ) -> list[InputSignal]:
-    """Add the time and the slope of every input that prescribes an angle, in the order of the model's inputs."""
+    """Add the time and the derivatives of inputs that prescribe a motion, in the order of the model's inputs."""
     by_name = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
     laid: list[InputSignal] = []
     for name in drive.input_names:
         if name == TIME:
             laid.append(clock)
         elif name.endswith("'"):
-            value, rate, _ = smooth_motion(by_name[name[:-1]].time, by_name[name[:-1]].values)
-            laid.append(InputSignal(by_name[name[:-1]].time, rate + 0.0 * value, False))
+            source = by_name[name.rstrip("'")]
+            present = np.isfinite(source.values)
+            motion = smooth_motion(source.time, source.values)
+            laid.append(InputSignal(source.time[present], motion[len(name) - len(name.rstrip("'"))], False))
         else:
             laid.append(by_name[name])
     return laid
+
+
+def _near_rest(grid: Grid, drive: SteppedDrive, speed_of: str, use: RecordingUse) -> npt.NDArray[np.bool_]:
+    """Return (n,) whether a prescribed speed at a node, or beside it, cannot be told from zero."""
+    speed = np.abs(grid.at_node[:, drive.input_names.index(speed_of)])
+    level = STILL * float(np.nanmax(speed, initial=0.0))
+    if not speed_of.endswith("'"):
+        recorded = use.recording.channels[speed_of]
+        level = max(level, NOISE_OF_REST * high_frequency_noise(recorded.time, recorded.values))
+    still = ~(speed > level)
+    return still | np.append(still[1:], False) | np.append(False, still[:-1])
 
 
 def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:

@@ -122,11 +122,13 @@ class Program:
 
     def measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""
+        states, active = self.sweep.start.size1_out(0), len(self.space.active)
+        if not states or not len(nodes):
+            return np.zeros((len(nodes), states)), np.zeros((len(nodes), states, theta.size))
         numbers, slope = self.space.numbers_and_slope(theta, item.name)
         many = self.sweep.start.map(len(nodes))
         signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
         value, by_active = many(*(signal[nodes].T for signal in signals), numbers)
-        states, active = self.sweep.start.size1_out(0), len(self.space.active)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
             return np.asarray(value).T, by_active @ slope
@@ -137,9 +139,8 @@ class Program:
         The derivatives are (measured, states, parameters). All recordings are computed at once.
         """
         states, counts = len(self.drive.state_names), [cut.measured for cut in self.segments]
-        if not any(counts):
-            nothing = np.zeros((0, states)), np.zeros((0, states, theta.size))
-            return [nothing] * len(counts)
+        if not states or not any(counts):
+            return [(np.zeros((count, states)), np.zeros((count, states, theta.size))) for count in counts]
         pairs = [self.space.numbers_and_slope(theta, item.name) for item in self.experiments]
         many, signals = self._starting
         value, by_active = many(*signals, np.repeat([pair[0] for pair in pairs], counts, axis=0).T)

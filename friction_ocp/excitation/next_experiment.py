@@ -31,6 +31,8 @@ _EXCITATION = {
 
 HOPELESS = 1.0
 """Expected squared distance, in noise floors, below which no motion separates rivals."""
+EVEN = 0.5
+"""Probability below which one recording more often than not decides nothing."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +65,24 @@ def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> Fo
 
 
 def _text(keys: tuple[Key, ...], option: Option | None) -> str:
-    named = " or ".join(_spoken(key) for key in keys)
+    named = " and ".join(_spoken(key) for key in keys)
     hints = [f"{_EXCITATION[key[0]]} ({_spoken(key)})" for key in keys if key[0] in _EXCITATION]
     if option is None:
         return (
             f"No motion within the limits tells {named} apart with these channels: they say the same in other words, "
-            f"or a further sensor is needed. What shows each by itself: {'; '.join(hints) or 'other loads'}."
+            f"or a further sensor is needed. {_shown_by(hints)}"
         )
-    run = option.run
-    return (
-        f"To tell {named} apart, record {run.motion.sentence}, up to {run.amplitude:.0%} of the allowed speed, as in "
-        f"next_experiment.h5: one recording decides with a probability of {option.power or 0.0:.0%}."
-    )
+    power = option.power or 0.0
+    motion = f"{option.run.motion.sentence}, up to {100 * option.run.amplitude:.0f} % of the allowed speed, as in "
+    chance = "less than 1 %" if power < 0.01 else f"{100 * power:.0f} %"
+    decides = f"next_experiment.h5: one recording decides with a probability of {chance}"
+    if power < EVEN:
+        return f"To tell {named} apart takes many recordings. The best motion: {motion}{decides}. {_shown_by(hints)}"
+    return f"To tell {named} apart, record {motion}{decides}."
+
+
+def _shown_by(hints: list[str]) -> str:
+    return f"What shows each by itself: {'; '.join(hints) or 'other loads'}."
 
 
 def _spoken(key: Key) -> str:

@@ -24,11 +24,11 @@ def significant(value: Any, digits: int = 4) -> str:
     return _written(float(value), _exponent(float(value)) - digits + 1)
 
 
-def plain(value: Any) -> str:
-    """Return a number as a person would state it, up to 6 digits, or a dash."""
+def plain(value: Any, digits: int = 6) -> str:
+    """Return a number as a person would state it, up to `digits` digits, or a dash."""
     if not is_number(value):
         return NOTHING
-    mantissa, _, power = f"{value:.6g}".partition("e")
+    mantissa, _, power = f"{value:.{digits}g}".partition("e")
     return f"{mantissa}e{int(power)}" if power else mantissa
 
 

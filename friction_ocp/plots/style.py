@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from friction_ocp.plots.palette import GRID, INK, MUTED
+from friction_ocp.whole_file import whole_file
 
 # matplotlib types few of its keywords, so its objects stay untyped here.
 Axes: TypeAlias = Any
@@ -82,14 +83,15 @@ def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> li
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure as PNG and SVG, without a date so that equal results give equal files."""
+    """Write a figure as PNG and SVG, each whole or not at all, without a date: equal results give equal files."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
     paths: list[Path] = []
     for ending, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = stem.with_name(f"{stem.name}.{ending}")
-        figure.savefig(path, format=ending, metadata=metadata)
+        with whole_file(path) as staged:
+            figure.savefig(staged, format=ending, metadata=metadata)
         figure.set_layout_engine("none")  # laid out once, for both files
         paths.append(path)
     return paths

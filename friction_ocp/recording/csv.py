@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.quantities import dimension_of
 from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, no_clock
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray, Recording
 from friction_ocp.recording.table import recording_of
@@ -57,7 +57,7 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
     stated = import_map or ImportMap(None, {})
     layout = sniff_layout(path, stated.delimiter, stated.decimal)
     rows, summary = _estimated_rows(path), f"delimiter {layout.delimiter!r}"
-    signals = [Signal(name, rows, _bracketed_unit(name)) for name in layout.names]
+    signals = [Signal(name, rows, header_unit(name)) for name in layout.names]
     if import_map is not None:
         yield ForeignFile(tuple(signals), partial(_read_columns, path, layout), no_clock, summary)
         return
@@ -78,18 +78,6 @@ def _estimated_rows(path: Path) -> int:
     with path.open("rb") as file:
         head = file.read(65_536)
     return path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1)
-
-
-def _bracketed_unit(header: str) -> str:
-    """Return the unit in "angle [deg]" or "angle (deg)", "" where there is none."""
-    match = re.search(r"[\[(]([^\[\]()]+)[\])]\s*$", header)
-    if match is None:
-        return ""
-    try:
-        dimension_of(match[1])
-    except FrictionOcpError:
-        return ""
-    return "" if match[1].strip().isdigit() else match[1].strip()
 
 
 def _whatever_is_a_number(path: Path, layout: Layout) -> FloatArray:

@@ -13,12 +13,13 @@ import yaml
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import dimension_of, to_si
+from friction_ocp.recording.static_points import COLUMNS
 
 MAX_CHARACTERS = 500_000
 MAX_BRACKETS = 20
 MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
-_KEYS = ("format", "time", "channels", *_TEXTS)
+_KEYS = ("format", "time", "channels", "points", *_TEXTS)
 _COLUMN_KEYS = ("column", "unit", "scale", "wrap", "reset", "instead_of")
 _CHANNEL_KEYS = (*_COLUMN_KEYS, "time")
 
@@ -56,6 +57,8 @@ class ImportMap:
     delimiter: str | None = None
     """Sniffed when None; " " is any run of spaces and tabs."""
     decimal: str = "."
+    points: Mapping[str, Column] = field(default_factory=dict[str, Column])
+    """Columns of static points, in place of channels."""
     where: str = "map"
     """The file of the map, for findings."""
 
@@ -110,10 +113,25 @@ class _MapReader:
         if texts.get("decimal", ".") not in (".", ","):
             self.report("decimal", f"unknown decimal sign '{texts['decimal']}'", "available: '.', ','")
         time = self.time("time", keys["time"]) if "time" in keys else None
-        channels = self.channels(keys.get("channels"))
-        if not channels:
+        points = self.points(keys["points"]) if "points" in keys else {}
+        if points and (time is not None or "channels" in keys):
+            self.report("points", "static points have no times and no channels", "", "leave time and channels out")
+        channels = {} if "points" in keys else self.channels(keys.get("channels"))
+        if not channels and not points:
             return None
-        return ImportMap(time, channels, where=self.where, **cast(dict[str, Any], texts))
+        return ImportMap(time, channels, points=points, where=self.where, **cast(dict[str, Any], texts))
+
+    def points(self, content: object) -> dict[str, Column]:
+        found = self.mapping("points", content, COLUMNS) or {}
+        columns: dict[str, Column] = {}
+        for name, entry in found.items():
+            column = self.column(f"points.{name}", entry, _COLUMN_KEYS) if name in COLUMNS else None
+            if column is not None:
+                self.dimension(f"points.{name}", column)
+                columns[name] = column
+        if "speed" not in found:
+            self.report("points", "there is no speed", "speed: {column, unit}, with torque or current")
+        return columns
 
     def channels(self, content: object) -> dict[str, Column]:
         found = self.mapping("channels", content)

@@ -12,15 +12,18 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv import open_csv
 from friction_ocp.recording.foreign import ForeignFile, Opener
 from friction_ocp.recording.import_map import load_import_map
+from friction_ocp.recording.json_log import open_json
 from friction_ocp.recording.listing import describe
 from friction_ocp.recording.matlab import open_matlab
 from friction_ocp.recording.matlab_hdf5 import open_hdf5
 from friction_ocp.recording.mdf import open_mdf
+from friction_ocp.recording.numpy_arrays import open_numpy
 from friction_ocp.recording.parquet import open_parquet
 from friction_ocp.recording.probe import probed
 from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.rosbag import open_rosbag
-from friction_ocp.recording.table import recording_of
+from friction_ocp.recording.static_points import StaticPoints
+from friction_ocp.recording.table import recording_of, static_points_of
 from friction_ocp.recording.tdms import open_tdms
 
 READERS: Mapping[str, Opener] = {
@@ -38,23 +41,36 @@ READERS: Mapping[str, Opener] = {
     ".db3": open_rosbag,
     ".bag": open_rosbag,
     ".tdms": open_tdms,
+    ".json": open_json,
+    ".jsonl": open_json,
+    ".ndjson": open_json,
+    ".npy": open_numpy,
+    ".npz": open_numpy,
 }
 """Reader by the suffix of the file; a further format is a further line."""
 
 
 def import_recording(path: str | Path, map_path: str | Path) -> Recording:
-    """Read a foreign file by a map; raises FrictionOcpError for an unknown format and with all that is wrong."""
+    """Read a foreign file by a map of channels; raises FrictionOcpError for an unknown format and all that is wrong."""
+    found = import_file(path, map_path)
+    if isinstance(found, StaticPoints):
+        raise FrictionOcpError(Finding(str(map_path), "the map is one of static points", "channels in place of points"))
+    return found
+
+
+def import_file(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
+    """Read a foreign file by a map: static points where the map has `points`, else a recording."""
     read = _import if _opener(Path(path)) is open_csv else probed(_import)
     return read(path, map_path)
 
 
-def _import(path: str | Path, map_path: str | Path) -> Recording:
+def _import(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
     path = Path(path)
     opener, import_map = _opener(path), load_import_map(map_path)
     _refuse_missing(path)
     with opener(path, import_map) as file:
         _refuse_nothing(file, path)
-        return recording_of(file, import_map, path)
+        return (static_points_of if import_map.points else recording_of)(file, import_map, path)
 
 
 def inspect_file(path: str | Path) -> str:

@@ -48,7 +48,8 @@ def list_signals(file: ForeignFile, path: Path) -> tuple[Listed, ...]:
 def describe(file: ForeignFile, path: Path) -> str:
     """Return a file as text: a line of its own, then one a signal."""
     listed = list_signals(file, path)
-    lines = [f"{path}: {len(listed)} columns" + (f", {file.summary}" if file.summary else "")]
+    count = f"{len(listed)} column" + ("s" if len(listed) != 1 else "")
+    lines = [f"{path}: {count}" + (f", {file.summary}" if file.summary else "")]
     if any(item.rate is not None and not item.signal.clock for item in listed):
         lines.append("Rates and lengths hold if the first increasing column is the time, in s.")
     if file.origin:

@@ -12,11 +12,12 @@ import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
-from friction_ocp.recording.checks import check_recording
+from friction_ocp.recording.checks import check_recording, check_static_points
 from friction_ocp.recording.counters import unroll
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
+from friction_ocp.recording.static_points import StaticPoints
 
 EXACT_INTEGERS = 2**53
 """Integers up to here are floats without loss; time in ns since 1970 is beyond it."""
@@ -63,6 +64,38 @@ def recording_of(file: ForeignFile, import_map: ImportMap, path: Path) -> Record
     return recording
 
 
+def static_points_of(file: ForeignFile, import_map: ImportMap, path: Path) -> StaticPoints:
+    """Turn the mapped columns into static points in SI units; raises FrictionOcpError with every finding."""
+    wanted = _wanted(file, import_map)
+    check_sizes(path, [item.signal for item in wanted.values()])
+    raw = file.read(sorted({item.index for item in wanted.values()}))
+    findings: list[Finding] = []
+    values: dict[str, FloatArray] = {}
+    units: dict[str, str] = {}
+    for place, item in wanted.items():
+        name = place.removeprefix("points.")
+        try:
+            values[name], units[name] = _converted(raw[item.index], item, 0, path)
+        except FrictionOcpError as error:
+            findings += error.findings
+    _raise(findings)
+    sha256 = _fingerprint(path)
+    points = StaticPoints(
+        name=path.stem,
+        speed=values.pop("speed"),
+        units=units,
+        **values,
+        title=import_map.title or path.stem,
+        source=import_map.source,
+        licence=import_map.licence,
+        path=path,
+        sha256=sha256,
+        attributes={"imported_from": path.name, "imported_sha256": sha256},
+    )
+    _raise(check_static_points(points, str(path)))
+    return points
+
+
 def _is_time(place: str) -> bool:
     return place == "time" or place.endswith(".time")
 
@@ -74,6 +107,7 @@ def _wanted(file: ForeignFile, import_map: ImportMap) -> dict[str, _Wanted]:
         entries[f"channels.{name}"] = entry
         if entry.time is not None:
             entries[f"channels.{name}.time"] = entry.time
+    entries |= {f"points.{name}": entry for name, entry in import_map.points.items()}
     findings: list[Finding] = []
     wanted: dict[str, _Wanted] = {}
     for place, entry in entries.items():

@@ -42,7 +42,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "question": paragraphs(str(result.get("question") or "")),
             "sentence": diagnosis_sentence(result),
             "evaluated_on": rows(gap, "evaluated_on"),
-            "horizon": plain(gap["horizon_s"]) if gap.get("horizon_s") is not None else "",
+            "horizon": plain(gap["horizon_s"], 3) if gap.get("horizon_s") is not None else "",
             "changed": bool(rows(result, "accepted")),
             "drifts": result.get("verdict") in ("no_gap", "explained"),
             "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
@@ -83,7 +83,7 @@ def _round(item: Json) -> dict[str, Any]:
     }
 
 
-def _cause(cause: Json) -> dict[str, str]:
+def _cause(cause: Json) -> dict[str, Any]:
     refitted = cause.get("refit_gain") is not None
     values = part(cause, "parameters").items() if refitted else ()
     return {
@@ -95,7 +95,7 @@ def _cause(cause: Json) -> dict[str, str]:
         "predicted": _gain(cause.get("predicted_gain")),
         "refit": _gain(cause.get("refit_gain")),
         "heldout": _gain(cause.get("heldout_gain")),
-        "parameters": ", ".join(f"{name} = {significant(value, 3)}" for name, value in values),
+        "parameters": [(name, significant(value, 3)) for name, value in values],
     }
 
 

@@ -64,7 +64,7 @@ def render_report(result: Json, series: Series) -> str:
             "warnings": rows(result, "warnings"),
             "parameters": parameter_rows(objects(result, "parameters")),
             "process_noise": parameter_rows(objects(result, "process_noise")),
-            "horizon": plain(part(result, "fit").get("horizon_s")),
+            "horizon": plain(part(result, "fit").get("horizon_s"), 3),
             "whole": part(result, "fit").get("horizon_s") is None,
             "fit": fit_rows(part(result, "fit")),
             "static": static_rows(part(result, "fit")),

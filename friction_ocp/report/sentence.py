@@ -29,7 +29,7 @@ def _fit(fit: Json) -> str:
     if not channels:
         return ""
     horizon = fit.get("horizon_s")
-    run = f"Free run over windows of {plain(horizon)} s" if is_number(horizon) else "Free run"
+    run = f"Free run over windows of {plain(horizon, 3)} s" if is_number(horizon) else "Free run"
     named = channels[:_NAMED]
     explained = _listed([f"{name} to {_error(train[name])}" for name in named])
     rest = len(channels) - len(named)

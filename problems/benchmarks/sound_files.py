@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,11 @@ SUFFIXES: Mapping[str, str] = {
     "tdms": ".tdms",
     "mcap": ".mcap",
     "rosbag": ".db3",
+    "json": ".json",
+    "numpy": ".npz",
 }
 """Readers, and the suffix of what they read."""
-TEXT = ("problem", "map", "csv")
+TEXT = ("problem", "map", "csv", "json")
 """Readers of text."""
 
 PROBLEM = """# Asked: the friction of an axis.
@@ -76,6 +79,8 @@ MAPS: Mapping[str, str] = {
         "tdms": "channels: {x: {column: g/x}}",
         "mcap": "channels: {x: {column: 0, unit: A}, y: {column: 1, unit: V}}",
         "rosbag": "channels: {x: {column: 0, unit: A}, y: {column: 1, unit: V}}",
+        "json": _TIME + f"channels: {{x: {{column: 1, {_UNIT}}}}}",
+        "numpy": _TIME + "channels: {x: {column: 1, unit: A}}",
     }.items()
 }
 """The map of each format's sound file."""
@@ -207,6 +212,18 @@ def _rosbag(storage: str, suffix: str) -> Callable[[Path], list[Path]]:
     return write
 
 
+def _numpy(folder: Path) -> list[Path]:
+    np.savez(folder / "plain.npz", t=_time(), x=np.sin(_time()))
+    np.savez_compressed(folder / "packed.npz", t=_time(), x=np.sin(_time()), both=np.ones((60, 2)))
+    log = np.zeros(60, dtype=[("t", "f8"), ("x", "f4")])
+    log["t"] = _time()
+    with (folder / "array.npz").open("wb") as file:
+        np.save(file, log)
+    return [folder / "plain.npz", folder / "packed.npz", folder / "array.npz"]
+
+
+_JSON = json.dumps({"t": _time().tolist(), "x [deg]": np.sin(_time()).tolist(), "mass": 0.5, "curve": {"1": 2, "3": 4}})
+_RECORDS = json.dumps([{"t": float(t), "x": float(np.sin(t)), "arm": {"y": [1, None]}} for t in _time()])
 _CSV = "".join(f"{t:.2f},{np.sin(t):.6f},{k % 7}\n" for k, t in enumerate(_time()))
 _GERMAN = "# Bench\nt [s];x [deg];n\n" + _CSV.replace(",", ";").replace(".", ",")
 
@@ -225,4 +242,6 @@ WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
     "tdms": _tdms,
     "mcap": _rosbag("MCAP", ".mcap"),
     "rosbag": _rosbag("SQLITE3", ".db3"),
+    "json": _texts("log.json", _JSON, _RECORDS),
+    "numpy": _numpy,
 }

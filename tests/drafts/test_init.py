@@ -13,8 +13,10 @@ import yaml
 
 from friction_ocp.cli import DONE, WRONG_INPUT, main
 from friction_ocp.drafts.axis import TEMPLATES
+from friction_ocp.drafts.draft import init
 from friction_ocp.drafts.model_joint import axis_of_joint
 from friction_ocp.drafts.questions import axis_of_answers
+from friction_ocp.errors import FrictionOcpError
 from friction_ocp.problem_file.check import check_file
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -57,7 +59,7 @@ def drafted(path: Path) -> dict:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("name", [name for name, axis in TEMPLATES.items() if not axis.linear])
+@pytest.mark.parametrize("name", [name for name, axis in TEMPLATES.items() if not (axis.linear or axis.held)])
 def test_templates_pass_the_rules_about_files(tmp_path: Path, rotary: Path, name: str) -> None:
     """Every template of a rotary drive is a problem with the recordings there, by paths beside the file."""
     out = tmp_path / "problems" / "axis.yaml"
@@ -68,6 +70,43 @@ def test_templates_pass_the_rules_about_files(tmp_path: Path, rotary: Path, name
     assert content["channels"]["ambient"]["measures"] == "temperature"
     shaft = "servo" if name == "servo" else "motor"
     assert content["channels"]["motor_position"]["measures"] == f"{shaft}.theta"
+
+
+@pytest.mark.parametrize(
+    ("units", "motion", "measures"),
+    [
+        (
+            {"normal": "N", "friction": "N", "position": "m"},
+            "linear",
+            {"position": "theta", "friction": "drive_torque"},
+        ),
+        ({"angle": "rad", "rate": "rad/s", "torque": "N m"}, "rotary", {"rate": "omega", "torque": "drive_torque"}),
+    ],
+)
+def test_a_test_bench_is_told_its_motion(
+    tmp_path: Path, units: dict[str, str], motion: str, measures: dict[str, str]
+) -> None:
+    """A tribometer's friction force, or a dynamometer's torque, is what the motion takes; sizes are as recorded."""
+    folder = record(tmp_path / "data", **units)
+    assert main(["init", "test_bench", "--recordings", str(folder), "--out", str(tmp_path / "a.yaml")]) == DONE
+    content = drafted(tmp_path / "a.yaml")
+    expected = {name: f"sample.{signal}" for name, signal in measures.items()}
+    assert {name: item["measures"] for name, item in content["channels"].items()} == expected
+    assert content["channels"][next(iter(measures))]["role"] == "input"
+    (shaft,) = content["drive"]["shafts"]
+    assert shaft.get("motion", "rotary") == motion and "motors" not in content["drive"]
+    assert 0.3 < shaft["friction"]["tau_c"]["guess"] < 1.0
+
+
+def test_a_force_drives_no_rotary_motor(tmp_path: Path) -> None:
+    """A tribometer's log is no feed drive, and what it is instead is said."""
+    folder = record(tmp_path / "data", friction="N", position="m")
+    with pytest.raises(FrictionOcpError, match=r"no channel drives the motor: they are friction \(N\), position \(m\)"):
+        init("feed_drive", folder, tmp_path / "a.yaml")
+    with pytest.raises(FrictionOcpError, match="or take the template test_bench"):
+        init("feed_drive", folder, tmp_path / "a.yaml")
+    with pytest.raises(FrictionOcpError, match="a motion and what it takes are not both there"):
+        init("test_bench", record(tmp_path / "other", friction="N", angle="rad"), tmp_path / "a.yaml")
 
 
 def test_a_linear_drive_keeps_its_units_apart(tmp_path: Path) -> None:
@@ -147,7 +186,7 @@ def test_questions_take_what_is_typical_for_an_answer(tmp_path: Path, monkeypatc
     [
         (
             ["rocket"],
-            "init: there is no template 'rocket'; templates: telescope_axis, servo, robot_joint, feed_drive; or a",
+            "init: there is no template 'rocket'; templates: telescope_axis, servo, robot_joint, feed_drive, test_",
         ),
         (["servo", "--joint", "a"], "init: --joint stands beside a template"),
         ([], "init: nothing is named, and there is no terminal to ask on; a template (telescope_axis,"),

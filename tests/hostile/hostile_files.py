@@ -6,6 +6,7 @@ import os
 import pickle
 import shutil
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -71,6 +72,19 @@ def log(name: str, content: Callable[[Path], object] | bytes, *columns: object) 
         return ["import", str(path), "--map", str(folder / "map.yaml"), "--out", str(folder / "out.h5")]
 
     return make
+
+
+def numpy_bomb(path: Path) -> None:
+    """Zeros that are small as long as nobody unpacks them, by what the archive says."""
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000,), }".ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("t.npy", "w") as entry:
+        entry.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+        for _ in range(8):
+            entry.write(b"\0" * 1000)
+    content = bytearray(path.read_bytes())
+    place = content.rindex(b"PK\x01\x02")
+    content[place + 24 : place + 28] = struct.pack("<I", 0xFFFFFFF0)
+    path.write_bytes(bytes(content))
 
 
 def import_map(content: str) -> Make:
@@ -224,6 +238,19 @@ class Command:
 
 
 HOSTILE: dict[str, tuple[Make, str]] = {
+    "json nested deeply": (
+        log("log.json", b'{"t": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"),
+        "this cannot be read as JSON (maximum recursion depth exceeded",
+    ),
+    "json cut off": (log("log.json", b'{"t": [0, 1, 2'), "this cannot be read as JSON (Expecting ',' delimiter"),
+    "json number of 5000 digits": (
+        log("log.json", b'{"t": [0, ' + b"9" * 5000 + b'], "x": [1, 2]}'),
+        "this cannot be read as JSON (Exceeds the limit",
+    ),
+    "numpy archive that unpacks to 4 GB": (
+        log("log.npz", numpy_bomb, "t", "x"),
+        "its arrays declare 4294967280 bytes; at most",
+    ),
     "yaml tag that runs code": (
         text(SOUND + "title2: !!python/object/apply:os.system ['touch owned']\n"),
         "this is not YAML: line 19, column 9: could not determine a constructor for the tag",
@@ -349,7 +376,7 @@ HOSTILE: dict[str, tuple[Make, str]] = {
     "map nested deeply": (import_map("format: " + "[" * 20_000), "this is nested too deeply"),
     "map with an alias bomb": (
         import_map(BOMB),
-        "unknown key 'e'; available: format, time, channels, title, source, licence,",
+        "unknown key 'e'; available: format, time, channels, points, title, source, licence,",
     ),
     "map with a channel out of the folder": (
         import_map("format: friction-ocp-map/1\ntime: {column: t, unit: s}\nchannels: {../x: {column: x, unit: A}}"),
@@ -394,8 +421,12 @@ HOSTILE: dict[str, tuple[Make, str]] = {
     "Parquet without its footer": (log("log.parquet", parquet_of_lies), "this cannot be read as a Parquet file ("),
     "ROS bag of another place": (log("bag", rosbag_elsewhere), "this cannot be read as a ROS bag ("),
     "suffix that no reader takes": (
+        log("log.pkl", pickle.dumps(Command())),
+        "no reader for '.pkl'; available: .csv, .tsv",
+    ),
+    "pickle in the place of an array": (
         log("log.npy", pickle.dumps(Command())),
-        "no reader for '.npy'; available: .csv, .tsv",
+        "this cannot be read as a NumPy file (",
     ),
 }
 """What is wrong -> how to make it, and what is said about it."""

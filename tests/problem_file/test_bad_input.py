@@ -173,6 +173,14 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         ),
         "arm-load.kinematic_error: 'load' comes before 'arm' in its group of rigidly joined shafts",
     ),
+    "drive torque without a prescribed motion": (
+        put("channels/effort", {"measures": "load.drive_torque"}),
+        "channels.effort: load.drive_torque cannot be predicted: no input prescribes the motion of 'load'; make the",
+    ),
+    "drive torque as an input": (
+        put("channels/effort", {"measures": "load.drive_torque", "role": "input"}),
+        "channels.effort.role: load.drive_torque is what a prescribed motion takes, and cannot be given beside it",
+    ),
     "moved behind an error": (
         several(
             put("drive/shafts", TWO_SHAFTS),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,6 +136,31 @@ def _rosbag(storage: str, inside: str = "") -> Callable[[Path], Path]:
     return write
 
 
+def _json(folder: Path) -> Path:
+    rows = [{"t": float(t), "arm": {"angle": float(value)}} for t, value in zip(fast(), angle(), strict=True)]
+    content = {"rig": "bench", "mass": 0.49, "log": rows, "drive": {"t": slow().tolist(), "mA": current().tolist()}}
+    (folder / "run.json").write_text(json.dumps(content), encoding="utf-8")
+    return folder / "run.json"
+
+
+def _json_lines(folder: Path) -> Path:
+    rows = [{"t": float(t), "angle [deg]": float(value)} for t, value in zip(fast(), angle(), strict=True)]
+    (folder / "run.jsonl").write_text("\n".join(map(json.dumps, rows)), encoding="utf-8")
+    return folder / "run.jsonl"
+
+
+def _npy(folder: Path) -> Path:
+    log = np.zeros(400, dtype=[("t", "f8"), ("angle", "f8")])
+    log["t"], log["angle"] = fast(), angle()
+    np.save(folder / "run.npy", log)
+    return folder / "run.npy"
+
+
+def _npz(folder: Path) -> Path:
+    np.savez_compressed(folder / "run.npz", t=fast(), angle=angle()[:, None], both=np.stack([slow(), current()]))
+    return folder / "run.npz"
+
+
 _ROS_CHANNELS = {
     "angle": {"column": "/joints.position[arm]", "unit": "deg"},
     "current": {"column": "/current.data", "unit": "mA"},
@@ -144,6 +170,15 @@ _MATLAB_CHANNELS = {
     "current": {"column": "log.both[1]", "unit": "mA", "time": {"column": "log.both[0]", "unit": "s"}},
 }
 _MATLAB_TIME = {"column": "log.t", "unit": "s"}
+_JSON_CHANNELS = {
+    "angle": {"column": "log.arm.angle", "unit": "deg"},
+    "current": {"column": "drive.mA", "unit": "mA", "time": {"column": "drive.t", "unit": "s"}},
+}
+_NPZ_CHANNELS = {
+    "angle": {"column": "angle", "unit": "deg"},
+    "current": {"column": "both[1]", "unit": "mA", "time": {"column": "both[0]", "unit": "s"}},
+}
+_SECONDS = {"column": "t", "unit": "s"}
 _OWN = {"angle": {"column": "angle"}, "current": {"column": "current"}}
 
 CASES = {
@@ -153,6 +188,12 @@ CASES = {
     "matlab 7.3": ForeignCase(_matlab73, _MATLAB_CHANNELS, _MATLAB_TIME, False),
     "mdf": ForeignCase(_mdf, _OWN),
     "tdms": ForeignCase(_tdms, {name: {"column": f"run/{name}"} for name in _OWN}),
+    "json": ForeignCase(_json, _JSON_CHANNELS, {"column": "log.t", "unit": "s"}, False),
+    "json lines": ForeignCase(_json_lines, {"angle": {"column": "angle [deg]"}}, _SECONDS),
+    "npy": ForeignCase(
+        _npy, {"angle": {"column": "data.angle", "unit": "deg"}}, {"column": "data.t", "unit": "s"}, False
+    ),
+    "npz": ForeignCase(_npz, _NPZ_CHANNELS, _SECONDS, False),
     "ros sqlite": ForeignCase(_rosbag("SQLITE3"), _ROS_CHANNELS, units_in_file=False),
     "ros mcap": ForeignCase(_rosbag("MCAP", "run.mcap"), _ROS_CHANNELS, units_in_file=False),
 }

@@ -185,7 +185,7 @@ def map_of(**changes: str) -> str:
         ({"format": "-"}, "format: format is ''; 'friction-ocp-map/1'"),
         (
             {"chanels": "{}"},
-            "unknown key 'chanels'; available: format, time, channels, title, source, licence, delimiter",
+            "unknown key 'chanels'; available: format, time, channels, points, title, source, licence, delimiter",
         ),
         ({"time": "~"}, "time: there is nothing; a mapping of column, unit, scale"),
         ({"time": "{unit: s}"}, "time: there is no column; {column, unit}"),

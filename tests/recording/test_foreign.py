@@ -18,8 +18,8 @@ from friction_ocp.cli import DONE, WRONG_INPUT, main
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.recording import foreign
 from friction_ocp.recording.foreign import MAX_SAMPLES, Signal, check_sizes
-from friction_ocp.recording.hdf5 import read_recording
-from friction_ocp.recording.import_recording import READERS, import_recording, inspect_file
+from friction_ocp.recording.hdf5 import read_recording, read_static_points
+from friction_ocp.recording.import_recording import READERS, import_file, import_recording, inspect_file
 
 ROUNDING = 1e-12
 NANOSECOND = 1.1e-9
@@ -55,7 +55,7 @@ def test_inspection_tells_name_unit_rate_and_length(tmp_path: Path, name: str) -
         row = next(row for row in rows if f"  {entry['column']}  " in row).split()
         assert ("deg" in row or "mA" in row) == case.units_in_file
         assert {"400", "100"} & set(row)
-        assert {"200", "50"} & set(row) or name.startswith("matlab")
+        assert {"200", "50"} & set(row) or name.startswith(("matlab", "json", "npz"))
 
 
 def test_dates_count_from_the_first(tmp_path: Path) -> None:
@@ -215,3 +215,58 @@ def test_libraries_are_loaded_only_for_their_formats() -> None:
     names = ("parquet", "mdf", "tdms", "rosbag", "matlab")
     modules = [importlib.import_module(f"friction_ocp.recording.{name}") for name in names]
     assert not any(hasattr(module, name) for module in modules for name in ("pyarrow", "asammdf", "nptdms", "rosbags"))
+
+
+def test_json_tells_single_values_and_tables_of_number_over_number(tmp_path: Path) -> None:
+    """What is no series stands beside them; an object of numbers is two series; gaps and texts are seen."""
+    path = tmp_path / "run.json"
+    path.write_text('{"mass": 0.49, "speed": {"1.0": 0.53, "2.5": 1.12}, "t": [0, 1, null], "mode": ["a", "b"]}')
+    shown = inspect_file(path)
+    assert "4 columns, JSON; beside them mass = 0.49" in shown
+    rows = {row.split()[1]: row.split() for row in shown.splitlines()[1:] if row[:1].isdigit()}
+    assert rows["speed.key"][-2:] == ["1", "2.5"] and rows["speed.value"][-2:] == ["0.53", "1.12"]
+    assert rows["t"][-2:] == ["0", "1"] and rows["mode"][-2:] == ["no", "numbers"]
+
+
+def test_objects_of_numpy_are_not_unpickled(tmp_path: Path) -> None:
+    """An array of objects is refused: reading it would run what it says."""
+    np.save(tmp_path / "run.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    with pytest.raises(FrictionOcpError, match="cannot be read as a NumPy file"):
+        inspect_file(tmp_path / "run.npy")
+
+
+def test_cells_of_matlab_are_series(tmp_path: Path) -> None:
+    """A cell array holds a series a cell: runs of different lengths."""
+    import scipy.io
+
+    cells = np.empty((2, 1), dtype=object)
+    cells[0, 0], cells[1, 0] = np.arange(5.0), np.arange(7.0)
+    scipy.io.savemat(tmp_path / "run.mat", {"runs": cells})
+    shown = inspect_file(tmp_path / "run.mat")
+    assert "runs{0}" in shown and "runs{1}" in shown and shown.splitlines()[-1].split()[2] == "7"
+
+
+def test_a_map_of_points_makes_static_points(tmp_path: Path) -> None:
+    """Steady speeds and torques of a table become static points in SI units, which a problem file can list."""
+    (tmp_path / "curve.csv").write_text("rpm,torque [mN m],runs\n60,120,3\n120,130,4\n-60,-118,3\n")
+    content = {
+        "format": "friction-ocp-map/1",
+        "points": {
+            "speed": {"column": "rpm", "unit": "rpm"},
+            "torque": {"column": "torque [mN m]"},
+            "runs": {"column": "runs", "unit": "1"},
+        },
+        "source": "bench",
+    }
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    arguments = ["import", str(tmp_path / "curve.csv"), "--map", str(tmp_path / "map.yaml")]
+    assert main([*arguments, "--out", str(tmp_path / "curve.h5")]) == DONE
+    points = read_static_points(tmp_path / "curve.h5")
+    np.testing.assert_allclose(points.speed, np.array([60, 120, -60]) * np.pi / 30)
+    assert points.torque is not None and points.runs is not None
+    np.testing.assert_allclose(points.torque, [0.12, 0.13, -0.118])
+    assert points.units["torque"] == "N m" and points.source == "bench"
+    content["points"] = {"speed": {"column": "rpm", "unit": "rpm"}, "force": {"column": "runs", "unit": "N"}}
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(FrictionOcpError, match="points: unknown key 'force'; available: speed, torque, current"):
+        import_file(tmp_path / "curve.csv", tmp_path / "map.yaml")

@@ -13,6 +13,7 @@ from report_example import identified
 from friction_ocp.plots import write_figures
 from friction_ocp.plots.curves import curve_label
 from friction_ocp.plots.figures import file_stem
+from friction_ocp.plots.style import new_figure, save
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +73,21 @@ def test_a_curve_is_named_by_what_tells_it_from_the_others() -> None:
     assert [curve_label(curve, [light, heavy]) for curve in (light, heavy)] == ["load 0 N m", "load 20 N m"]
     assert [curve_label(curve, [light, other]) for curve in (light, other)] == ["lugre", "coulomb"]
     assert curve_label(light, [light]) == "fitted"
+
+
+def test_a_figure_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    """Whoever is interrupted while drawing leaves the old file, or none."""
+    figure = new_figure(2.0)
+    whole = save(figure, tmp_path / "curve")
+
+    def interrupted(path: Path, **options: object) -> None:
+        path.write_bytes(b"<svg")
+        raise KeyboardInterrupt
+
+    before = [path.read_bytes() for path in whole]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figure, "savefig", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            save(figure, tmp_path / "curve")
+    assert [path.read_bytes() for path in whole] == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["curve.png", "curve.svg"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.drive.parts import Channel
-from friction_ocp.drive.units import signal_unit
+from friction_ocp.drive.units import DRIVE_TORQUE, signal_unit
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse, StaticUse
 from friction_ocp.expressions import closest
@@ -158,10 +158,30 @@ def current_and_motion_agree(case: Case) -> Iterator[Finding]:
                 continue
             gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
             if gain and contradicts(motion, recorded.time, sign * (recorded.values - offset) / gain, heavy):
-                what = f"channel '{channel.name}' and the motion of shaft '{motor.shaft}' have opposite signs"
-                allowed = "a positive torque accelerates in the positive direction"
-                remedy = f"set the gain of '{channel.name}' to -1, or correct the sign of the position"
-                yield Finding(case.at_recording(place, use), what, allowed, remedy)
+                yield _opposite(case.at_recording(place, use), channel.name, motor.shaft)
+
+
+def _opposite(where: str, channel: str, shaft: str) -> Finding:
+    what = f"channel '{channel}' and the motion of shaft '{shaft}' have opposite signs"
+    allowed = "a positive torque accelerates in the positive direction"
+    return Finding(where, what, allowed, f"set the gain of '{channel}' to -1, or correct the sign of the position")
+
+
+def drive_torque_and_motion_agree(case: Case) -> Iterator[Finding]:
+    """What moves a body with friction does work on it: it would not if a sign were wrong."""
+    weights = [shaft.name for shaft in case.drive.shafts if shaft.gravity is not None]
+    for place, use in case.uses():
+        heavy = [seen for name in weights if (seen := case.motion(name, use)) is not None]
+        for channel in case.drive.outputs:
+            recorded = use.recording.channels.get(channel.name)
+            if channel.signal != DRIVE_TORQUE or recorded is None:
+                continue
+            motion = case.motion(channel.part, use, rigidly=True)
+            if motion is None:
+                continue
+            gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
+            if gain and contradicts(motion, recorded.time, (recorded.values - offset) / gain, heavy):
+                yield _opposite(case.at_recording(place, use), channel.name, channel.part)
 
 
 NAMES: tuple[Rule, ...] = (recordings_have_names_of_their_own,)
@@ -173,4 +193,5 @@ RECORDINGS: tuple[Rule, ...] = (
     motors_are_enabled,
     inputs_move,
     current_and_motion_agree,
+    drive_torque_and_motion_agree,
 )

@@ -6,14 +6,15 @@ from collections import Counter
 from collections.abc import Iterator
 
 from friction_ocp.drive.parts import Channel, Drive, Motor
-from friction_ocp.drive.units import MOTOR_SIGNALS, REFERENCE_SIGNALS, SHAFT_SIGNALS
+from friction_ocp.drive.topology import topology
+from friction_ocp.drive.units import DRIVE_TORQUE, MOTOR_SIGNALS, REFERENCE_SIGNALS, SHAFT_SIGNALS
 from friction_ocp.errors import Finding
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule
 
 DRIVING_SIGNALS = ("torque", "current", "voltage")
 """Signals of a motor that make it turn when they are inputs."""
-_PREDICTED = {"theta", "omega", "alpha", "torque", "current", "voltage"}
+_PREDICTED = {"theta", "omega", "alpha", "torque", "current", "voltage", DRIVE_TORQUE}
 _REFERENCE_OF = {"duty": "theta", "p": "theta", "pd": "theta", "cascade": "theta", "pi_velocity": "omega"}
 
 
@@ -36,7 +37,7 @@ def channels_measure_what_exists(case: Case) -> Iterator[Finding]:
 
 def available_signals(drive: Drive) -> list[str]:
     """Return everything that a channel of the drive could measure."""
-    shafts = [f"{shaft.name}.{signal}" for shaft in drive.shafts for signal in SHAFT_SIGNALS]
+    shafts = [f"{shaft.name}.{signal}" for shaft in drive.shafts for signal in (*SHAFT_SIGNALS, DRIVE_TORQUE)]
     motors = [f"{motor.name}.{signal}" for motor in drive.motors for signal in MOTOR_SIGNALS]
     return [*shafts, *motors, *(f"reference.{signal}" for signal in REFERENCE_SIGNALS), "temperature"]
 
@@ -49,6 +50,9 @@ def roles_fit_signals(case: Case) -> Iterator[Finding]:
             yield Finding(where, f"nothing predicts {channel.measures}", "role: input", "state role: input")
         if channel.role == "input" and channel.signal == "alpha":
             yield Finding(where, f"{channel.measures} cannot drive a shaft", "theta or omega, or role: output")
+        if channel.role == "input" and channel.signal == DRIVE_TORQUE:
+            what = f"{channel.measures} is what a prescribed motion takes, and cannot be given beside it"
+            yield Finding(where, what, "role: output", "to drive a shaft by a torque, measure <motor>.torque")
 
 
 def inputs_are_single(case: Case) -> Iterator[Finding]:
@@ -83,6 +87,13 @@ def _kinds_of_driving(drive: Drive, motor: Motor) -> set[str]:
 def is_prescribed(drive: Drive) -> bool:
     """Whether the motion of a shaft is an input."""
     return any(_is_input(drive, f"{shaft.name}.{signal}") for shaft in drive.shafts for signal in ("theta", "omega"))
+
+
+def _moves_as_prescribed(drive: Drive, shaft: str) -> bool:
+    """Whether an input prescribes the motion of a shaft, or that of one rigidly joined to it."""
+    joined = topology(drive)
+    driven = {channel.part for channel in drive.inputs if channel.signal in ("theta", "omega")}
+    return any(joined.group_of.get(part) == joined.group_of.get(shaft) for part in driven)
 
 
 def motors_are_driven(case: Case) -> Iterator[Finding]:
@@ -128,7 +139,13 @@ def motor_outputs_can_be_predicted(case: Case) -> Iterator[Finding]:
     needed = {"current": {"current", "voltage"}, "voltage": {"voltage"}, "torque": set(DRIVING_SIGNALS)}
     motors = {motor.name: motor for motor in case.drive.motors}
     for channel in case.drive.outputs:
+        if channel.signal == DRIVE_TORQUE and not _moves_as_prescribed(case.drive, channel.part):
+            what = f"{channel.measures} cannot be predicted: no input prescribes the motion of '{channel.part}'"
+            remedy = f"make the channel of {channel.part}.omega or {channel.part}.theta an input"
+            yield Finding(case.at(f"channels.{channel.name}"), what, remedy=remedy)
         if channel.part not in motors or channel.signal not in needed:
+            continue
+        if channel.signal != "voltage" and _moves_as_prescribed(case.drive, motors[channel.part].shaft):
             continue
         kinds = _kinds_of_driving(case.drive, motors[channel.part])
         if not kinds & needed[channel.signal]:
