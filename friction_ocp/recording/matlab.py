@@ -78,7 +78,7 @@ def _columns(name: str, value: Any, depth: int) -> Iterator[tuple[str, Values]]:
     if isinstance(value, dict) and depth < MAX_DEPTH:
         for key, inner in cast(dict[str, Any], value).items():
             yield from _columns(f"{name}.{key}", inner, depth + 1)
-    elif isinstance(value, np.ndarray) and value.dtype == object and depth < MAX_DEPTH:
+    elif isinstance(value, np.ndarray) and cast(Values, value).dtype == object and depth < MAX_DEPTH:
         for index, inner in np.ndenumerate(cast(Values, value)):
             yield from _columns(f"{name}{{{','.join(map(str, index))}}}", inner, depth + 1)
     elif isinstance(value, np.ndarray):
