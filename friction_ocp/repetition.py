@@ -129,6 +129,9 @@ def read_result(path: Path) -> dict[str, Any]:
     """Read a result.json; raises FrictionOcpError where it is none."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        what, allowed = "there is no such result", "result.json, or the folder that holds it"
+        raise FrictionOcpError(Finding(str(path), what, allowed, "correct the path")) from error
     except (OSError, ValueError, RecursionError) as error:
         what = f"this cannot be read as a result ({error})"
         raise FrictionOcpError(Finding(str(path), what, "result.json, or the folder that holds it")) from error

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from typing import Any, NoReturn
@@ -175,7 +176,7 @@ def test_check_of_a_sound_problem(tmp_path: Path) -> None:
     """Nothing found is status 0."""
     ran = run("check", write_servo(tmp_path))
     assert ran.status == DONE
-    assert ran.out.endswith("nothing found\n")
+    assert ran.out.endswith("nothing is wrong with it\n")
 
 
 @pytest.mark.parametrize("command", ["check", "identify", "simulate"])
@@ -298,3 +299,17 @@ def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch) -> Non
     shown = terminal.getvalue()
     assert "stage 1 of 2" in shown and "12.5" in shown
     assert shown.endswith("\x1b[2K")
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    """`--version` names the toolkit and the number that results carry."""
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == DONE
+    assert capsys.readouterr().out.strip() == f"friction-ocp {version('friction-ocp')}"
+
+
+def test_a_folder_is_no_problem_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a folder is taken for is said."""
+    assert main(["check", str(tmp_path)]) == WRONG_INPUT
+    assert "this is a folder; a problem file, such as axis.yaml" in "".join(capsys.readouterr())

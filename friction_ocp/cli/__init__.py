@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 
 from friction_ocp.cli import (
     checking,
@@ -48,6 +49,7 @@ def _parser() -> Parser:
         description="Finds the friction in a drive from its own logs.",
         epilog="Exit status: 0 done, 1 the input is wrong, 2 the solver did not converge, 3 interrupted.",
     )
+    parser.add_argument("--version", action="version", version=f"friction-ocp {version('friction-ocp')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for group in (checking, fitting, diagnosing, statistics, fleets, repeating, importing, exporting, drafting):
         group.add_commands(commands)

@@ -34,5 +34,5 @@ def _check(options: argparse.Namespace) -> int:
         for finding in findings:
             print(f"{finding.severity}: {finding}" if finding.severity == "warning" else finding)
         if not findings:
-            print(f"{options.problem}: nothing found")
+            print(f"{options.problem}: nothing is wrong with it")
     return WRONG_INPUT if any(finding.severity == "error" for finding in findings) else DONE

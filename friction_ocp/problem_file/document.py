@@ -122,6 +122,8 @@ def _read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise FrictionOcpError(Finding(where, "there is no such file", remedy="correct the path")) from error
+    except IsADirectoryError as error:
+        raise FrictionOcpError(Finding(where, "this is a folder", "a problem file, such as axis.yaml")) from error
     except (OSError, UnicodeDecodeError) as error:
         what = f"the file cannot be read as text ({error})"
         raise FrictionOcpError(Finding(where, what, "a YAML file in UTF-8")) from error
