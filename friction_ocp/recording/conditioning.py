@@ -95,6 +95,23 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     return stuck >= min_share * len(y)
 
 
+def without_low_pass(time: npt.ArrayLike, values: npt.ArrayLike, time_constant: float) -> FloatArray:
+    """Return (n,) what a first-order filter was fed that shows `values`: its mean from each sample to the next.
+
+    A controller that reports a filtered current shows it late and flattened. The filter is inverted exactly for an
+    input held between samples; the last interval repeats the one before it, and missing samples stay so.
+    """
+    t, y = np.asarray(time, dtype=np.float64), np.array(values, dtype=np.float64)
+    present = np.flatnonzero(np.isfinite(t) & np.isfinite(y))
+    if present.size < 2:
+        return y
+    shown, kept = y[present], np.exp(-np.diff(t[present]) / time_constant)
+    with np.errstate(divide="ignore", invalid="ignore"):  # times that stand still are refused by the checks that follow
+        fed = (shown[1:] - kept * shown[:-1]) / (1.0 - kept)
+    y[present] = np.append(fed, fed[-1])
+    return y
+
+
 def smooth_motion(
     time: npt.ArrayLike, values: npt.ArrayLike, cutoff_hz: float | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

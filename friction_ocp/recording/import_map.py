@@ -21,7 +21,9 @@ MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
 _KEYS = ("format", "time", "channels", "points", *_TEXTS)
 _COLUMN_KEYS = ("column", "unit", "scale", "wrap", "reset", "instead_of")
-_CHANNEL_KEYS = (*_COLUMN_KEYS, "time")
+_CHANNEL_KEYS = (*_COLUMN_KEYS, "low_pass", "time")
+_NUMBERS = ("wrap", "reset", "low_pass")
+_POSITIVE = {"wrap": "65536 or 360", "low_pass": "0.01 s"}
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Column:
     """The value to which a counter is set, in the numbers of the column."""
     instead_of: str = ""
     """The unit that the file states, where `unit` is to be taken instead."""
+    low_pass: float | None = None
+    """Time constant, s, of the first-order filter through which the logger reports it; it is undone."""
     time: Column | None = None
     """The times of this channel alone."""
 
@@ -165,9 +169,10 @@ class _MapReader:
             self.report(f"{place}.column", f"column is {name!r}", "a header, or an index from 0")
             return None
         texts = {key: self.text(f"{place}.{key}", keys[key]) for key in ("unit", "scale", "instead_of") if key in keys}
-        numbers = {key: self.number(f"{place}.{key}", keys[key]) for key in ("wrap", "reset") if key in keys}
-        if numbers.get("wrap") is not None and not cast(float, numbers["wrap"]) > 0.0:
-            self.report(f"{place}.wrap", f"wrap is {keys['wrap']!r}", "a number above 0, such as 65536 or 360")
+        numbers = {key: self.number(f"{place}.{key}", keys[key]) for key in _NUMBERS if key in keys}
+        for key, example in _POSITIVE.items():
+            if numbers.get(key) is not None and not cast(float, numbers[key]) > 0.0:
+                self.report(f"{place}.{key}", f"{key} is {keys[key]!r}", f"a number above 0, such as {example}")
         time = self.time(f"{place}.time", keys["time"]) if "time" in keys else None
         return Column(name, **cast(dict[str, Any], texts | numbers), time=time)
 

@@ -13,6 +13,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.checks import check_recording, check_static_points
+from friction_ocp.recording.conditioning import without_low_pass
 from friction_ocp.recording.counters import unroll
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
@@ -220,7 +221,10 @@ def _channels(
         if clock is None:
             clock = _clock_name(label, axes) if axes else "time"
             axes[clock] = time
-        channels[name] = Channel(name, axes[clock], *values[f"channels.{name}"], clock=clock)
+        series, unit = values[f"channels.{name}"]
+        if entry.low_pass is not None:
+            series = without_low_pass(axes[clock], series, entry.low_pass)
+        channels[name] = Channel(name, axes[clock], series, unit, clock=clock)
     return channels
 
 

@@ -24,12 +24,23 @@ def diagnosis_sentence(result: Json) -> str:
             likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
             return f"There is a gap, and several causes fit it: {likely}."
         case _ if accepted:
-            found = f"The model lacked {_listed(accepted)}, with which {_closed(closed)}"
+            found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
             return (
                 f"{found}; what is left{_place(result)} is more than noise, and nothing in the catalogue explains it."
             )
         case _:
             return f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
+
+
+def _with_rivals(result: Json) -> list[str]:
+    """Name every accepted effect, with those that the recordings cannot tell it from."""
+    sets = [[_named(item) for item in members] for members in rows(result, "alias_sets")]
+    found: list[str] = []
+    for name in (_named(item) for item in rows(result, "accepted")):
+        others = [other for members in sets if members[0] == name for other in members[1:]]
+        doubt = f" (or {' or '.join(others)}: these recordings cannot tell)" if others else ""
+        found.append(f"{name}{doubt}")
+    return found
 
 
 def round_sentence(item: Json) -> str:

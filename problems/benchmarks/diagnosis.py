@@ -134,16 +134,19 @@ def _odrive() -> tuple[str, bool | None]:
     if not seen:
         return "ODrive: no data", None
     named = {kind: _cogging(one) for kind, one in seen.items()}
-    return "\n".join(one.told + _period(one) for one in seen.values()), named["nocomp"] and not named["comp"]
+    return "\n".join(one.told + _wave(one) for one in seen.values()), named["nocomp"] and not named["comp"]
 
 
 def _cogging(seen: Named) -> bool:
-    return any("cogging" in {effect for effect, _ in one} for one in seen.sets)
+    return ("cogging", "motor") in seen.found.accepted
 
 
-def _period(seen: Named) -> str:
-    values = {key: value for key, value in seen.found.final.values.items() if ".cogging." in key}
-    return "".join(f"; {key} {value:.4g}" for key, value in values.items())
+def _wave(seen: Named) -> str:
+    """Return period and size of every wave that was added."""
+    values = seen.found.final.values
+    stems = [key.removesuffix(".period") for key in values if key.endswith(".period")]
+    sizes = {stem: float(np.hypot(values[f"{stem}.cosine"], values[f"{stem}.sine"])) for stem in stems}
+    return "".join(f"; {stem}: {size:.3g} over {values[f'{stem}.period']:.4g}" for stem, size in sizes.items())
 
 
 def harmonic_drive(line: str, quick: bool) -> Check:

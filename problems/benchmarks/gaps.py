@@ -16,6 +16,7 @@ import yaml
 
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.conditioning import without_low_pass
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -241,34 +242,53 @@ def slow_motion(folder: Path, seed: int) -> Path:
     return write(folder, document, runs, RUNS[2:])
 
 
+REPORT_FILTER = 0.125
+"""s: the ODrive moves the current that it reports by 0.001 of each new sample at 8 kHz (`I_measured_report_filter_k` in
+the notes of its user)."""
+COGGING_MAP = "cogging_measure_final_a_4"
+"""A, over the angle: the finest of the maps that the compensation was made from."""
+
+
 def odrive(kind: str, folder: Path) -> Path | None:
     """Write the slow turns of a motor with (`comp`) or without (`nocomp`) compensation; None where there are no data.
 
-    Constants as its maker publishes them: 0.4 A of cogging are 3 mN m, the rotor has about 2.5e-4 kg m^2.
+    The current is what passed the report filter. In the compensated runs it holds the compensation too, since the motor
+    itself cogs as before; the compensated drive is driven by the rest. Torque constant as its maker publishes it: 0.4 A
+    are 3 mN m. The published inertia, 2.5e-4 kg m^2, is a guess: the runs begin with jerks that contradict it.
     """
     source = os.environ.get(ODRIVE)
     if not source:
         return None
-    runs: dict[str, Recording] = {}
-    for k in range(3):
-        time, counts, current = scipy.io.loadmat(Path(source) / "slow2" / f"{kind}_{k}.mat")["data"]
-        order = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0)
-        angle = 2.0 * np.pi * np.unwrap(counts[order], period=COUNTS) / COUNTS
-        channels = {
-            "position": Channel("position", time[order], angle, "rad"),
-            "current": Channel("current", time[order], current[order], "A"),
-        }
-        title = "ODrive, very slow turns; G. Chen 2020, gchenfc/ODrive"
-        runs[f"{kind}_{k}"] = Recording(f"{kind}_{k}", channels, title=title, source=source, licence="MIT")
     law = {"law": "coulomb_viscous", "tau_c": guessed(1e-3), "viscous": guessed(1e-4)}
     document = {
         "drive": {
             "motor": {"name": "motor", "torque_constant": 3e-3 / 0.4},
-            "shafts": [{"name": "motor", "inertia": 2.5e-4, "friction": law}],
+            "shafts": [{"name": "motor", "inertia": guessed(2.5e-4), "friction": law}],
         },
         "channels": {
-            "current": {"measures": "motor.current", "role": "input"},
+            "current": {"measures": "motor.current", "role": "input", "hold": "zero"},
             "position": {"measures": "motor.theta", "resolution": 2.0 * np.pi / COUNTS},
         },
     }
+    runs = {f"{kind}_{k}": _odrive_run(Path(source), f"{kind}_{k}") for k in range(3)}
     return write(folder, document, runs, [f"{kind}_2"])
+
+
+def _odrive_run(source: Path, name: str) -> Recording:
+    time, counts, reported = scipy.io.loadmat(source / "slow2" / f"{name}.mat")["data"]
+    order = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0)
+    time, counts = time[order], counts[order]
+    current = without_low_pass(time, reported[order], REPORT_FILTER)
+    if name.startswith("comp"):
+        current = current - _compensation(source, counts)
+    angle = 2.0 * np.pi * np.unwrap(counts, period=COUNTS) / COUNTS
+    channels = {"position": Channel("position", time, angle, "rad"), "current": Channel("current", time, current, "A")}
+    title = "ODrive, very slow turns; G. Chen 2020, gchenfc/ODrive"
+    return Recording(name, channels, title=title, source=str(source), licence="MIT")
+
+
+def _compensation(source: Path, counts: np.ndarray) -> np.ndarray:
+    """Return the current that the compensation adds, A; zeros of the map were not measured."""
+    measured = np.load(source / "coggingmap_0" / f"{COGGING_MAP}.npy")
+    at = np.flatnonzero(measured)
+    return np.interp(np.mod(counts, COUNTS), at, measured[at], period=COUNTS)

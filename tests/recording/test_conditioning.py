@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise, is_clipped, smooth_motion
+from friction_ocp.recording.conditioning import (
+    detect_resolution,
+    high_frequency_noise,
+    is_clipped,
+    smooth_motion,
+    without_low_pass,
+)
 
 SAMPLING_ERROR = 0.06
 """Relative; a median absolute deviation of some 4,000 correlated samples."""
@@ -185,3 +191,19 @@ def test_smooth_motion_needs_samples() -> None:
     """Too few samples are refused in words."""
     with pytest.raises(FrictionOcpError, match="smooth motion: there are 2 samples; at least 5 are needed"):
         smooth_motion([0.0, 1.0, 2.0], [0.0, np.nan, 1.0])
+
+
+@pytest.mark.parametrize("time_constant", [1e-4, 0.02, 1.0])
+def test_a_low_pass_is_undone(rng: np.random.Generator, time_constant: float) -> None:
+    """Held levels come back from behind a filter that moves towards them exponentially; a missing sample stays so."""
+    time = times(rng)
+    fed = rng.normal(size=N)
+    shown = np.zeros(N)
+    for k in range(N - 1):
+        shown[k + 1] = fed[k] + (shown[k] - fed[k]) * np.exp(-(time[k + 1] - time[k]) / time_constant)
+    found = without_low_pass(time, shown, time_constant)
+    np.testing.assert_allclose(found[:-1], fed[:-1], atol=1e-9)
+    shown[N // 2] = np.nan
+    holed = without_low_pass(time, shown, time_constant)
+    assert np.flatnonzero(~np.isfinite(holed)).tolist() == [N // 2]
+    np.testing.assert_allclose(np.delete(holed, [N // 2 - 1, N // 2])[:-1], np.delete(fed, [N // 2 - 1, N // 2])[:-1])

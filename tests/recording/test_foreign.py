@@ -158,6 +158,19 @@ def test_wraps_are_unrolled(tmp_path: Path, turn: float) -> None:
     assert f"near half of wrap = {0.15 * turn:.6g}; steps of" in refusal(case, tmp_path, wrap=0.15 * turn)
 
 
+def test_a_filter_of_the_logger_is_undone(tmp_path: Path) -> None:
+    """A step seen through a first-order filter is a step again, and a time constant of zero is refused."""
+    time = 0.01 * np.arange(100)
+    shown = np.where(time > 0.3, 2.0 * (1.0 - np.exp(-(time - 0.3) / 0.1)), 0.0)
+    rows = "".join(f"{t:.2f},{value!r}\n" for t, value in zip(time, shown.tolist(), strict=True))
+    (tmp_path / "run.csv").write_text("t,i\n" + rows)
+    entry = {"column": "i", "unit": "rad", "low_pass": 0.1}
+    case = ForeignCase(lambda folder: folder / "run.csv", {"angle": entry}, {"column": "t", "unit": "s"})
+    values = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["angle"].values
+    np.testing.assert_allclose(values, np.where(time > 0.295, 2.0, 0.0), atol=1e-9)
+    assert "low_pass is 0; a number above 0" in refusal(case, tmp_path, low_pass=0)
+
+
 def test_clocks_that_start_over_go_on(tmp_path: Path) -> None:
     """A counter of us that wraps at 2^32, and one that a restart sets to 0, give times that only grow."""
     steps = 10_000 * np.arange(100)
