@@ -14,7 +14,7 @@ from friction_ocp.estimation.curves import FrictionCurve, friction_curves
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
-from friction_ocp.estimation.identifiability import Verdict, verdicts
+from friction_ocp.estimation.identifiability import Verdict, beyond_the_log, named_in_trades, verdicts
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare, prepare_fit
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
@@ -22,6 +22,7 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.rounds import Fitted, program_builder
+from friction_ocp.estimation.sampling_limit import beyond_sampling
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
@@ -152,7 +153,10 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     missed = [fit for fit in simulation.static if fit.split == "train" and misses_points(fit)]
     white = all(test.white for tests in residuals.values() for test in tests.values()) and not missed
     doubt = uncertainty(model.space, theta, found, white, problem.estimation.loss == "absolute")
-    parameters = _parameter_estimates(model, theta, doubt, verdicts(model.space, theta, doubt))
+    judged = verdicts(model.space, theta, doubt)
+    too_fast = beyond_sampling(model, theta, named_in_trades(model.space, judged))
+    judged = beyond_the_log(model.space, judged, too_fast)
+    parameters = _parameter_estimates(model, theta, doubt, judged)
     return Estimate(
         problem=problem,
         converged=solution.converged,

@@ -26,6 +26,28 @@ class Verdict:
     traded_with: tuple[str, ...] = ()
 
 
+def named_in_trades(space: ParameterSpace, judged: tuple[Verdict, ...]) -> BoolArray:
+    """Return which parameters are traded, or that others are traded with."""
+    named = {name for verdict in judged for name in verdict.traded_with}
+    return np.array(
+        [verdict.word == "traded" or name in named for name, verdict in zip(space.names, judged, strict=True)]
+    )
+
+
+def beyond_the_log(space: ParameterSpace, judged: tuple[Verdict, ...], too_fast: BoolArray) -> tuple[Verdict, ...]:
+    """Call those parameters of a trade not identifiable that act only through motions faster than the recordings.
+
+    Even the combination that is known of them rests on how the inputs ran between the samples, which nobody recorded.
+    """
+    result = list(judged)
+    for k in np.flatnonzero(too_fast):
+        naming = tuple(
+            name for name, other in zip(space.names, judged, strict=True) if space.names[k] in other.traded_with
+        )
+        result[k] = Verdict("not_identifiable", judged[k].traded_with or naming)
+    return tuple(result)
+
+
 def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tuple[Verdict, ...]:
     """Judge every parameter."""
     unseen = _unseen(space, theta, found)

@@ -58,6 +58,11 @@ def _parameter_warning(item: NamedVerdict) -> str:
     shown = _shown(item)
     if item.verdict.word == "at_bound":
         return f"{shown} lies on its bound: widen the bound, or the model asks the parameter for something else."
+    if item.verdict.traded_with:
+        return (
+            f"{shown}: the recordings do not tell this parameter; what would tell it from "
+            f"{', '.join(item.verdict.traded_with)} is a motion faster than half their sampling rate; log faster."
+        )
     return f"{shown}: the recordings do not tell this parameter; fix it, give a prior, or record what shows it."
 
 
