@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import scipy.signal as _signal  # pyright: ignore[reportMissingTypeStubs]
+import scipy.spatial as _spatial  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.simulation.grid import FloatArray
 
 signal: Any = _signal  # its own types are incomplete
+spatial: Any = _spatial
 
 SEGMENTS = 8
 """Segments, overlapping by half, that a coherence is averaged over."""
@@ -61,6 +63,6 @@ def curve_distance(time: FloatArray, measured: FloatArray, simulated: FloatArray
     t, v = time[known], measured[known]
     k = float(np.sqrt(np.mean(v**2)) / (t[-1] - t[0])) if scale is None else scale
     fine = np.sort(np.concatenate((np.linspace(float(t[0]), float(t[-1]), FINENESS * t.size), t)))
-    curve = np.interp(fine, t, simulated[known])
-    least = [float(np.min((curve - value) ** 2 + (k * (fine - at)) ** 2)) for at, value in zip(t, v, strict=True)]
-    return float(np.std(np.sqrt(least)))
+    curve = np.column_stack((k * fine, np.interp(fine, t, simulated[known])))
+    least, _ = spatial.cKDTree(curve).query(np.column_stack((k * t, v)))
+    return float(np.std(least))

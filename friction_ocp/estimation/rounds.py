@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -151,7 +152,8 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
         watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
         last = k == rounds - 1
         solve = solve_composite if k > 0 and keeps_the_loss(model, program) else final_solver(model)
-        ends = race(program, points, limits(model) if last else COARSE, watch, solve)
+        enough = partial(is_sound_end, model, program) if plan.conclusive else _never
+        ends = race(program, points, limits(model) if last else COARSE, watch, solve, enough)
         if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
@@ -159,9 +161,25 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     return [Fitted(replace(end, iterations=iterations), program) for end in ends]
 
 
-def race(program: Program, points: Sequence[Point], limits: Tolerances, watch: Watch, solve: Solve) -> list[Solution]:
-    """Solve from every point and return the ends, best first."""
-    return sorted((solve(program, point, limits, watch) for point in points), key=lambda end: end.objective)
+def _never(end: Solution) -> bool:
+    return False
+
+
+def race(
+    program: Program,
+    points: Sequence[Point],
+    limits: Tolerances,
+    watch: Watch,
+    solve: Solve,
+    enough: Callable[[Solution], bool] = _never,
+) -> list[Solution]:
+    """Solve from every point, up to the first whose end is `enough`, and return the ends, best first."""
+    ends: list[Solution] = []
+    for point in points:
+        ends.append(solve(program, point, limits, watch))
+        if enough(ends[-1]):
+            break
+    return sorted(ends, key=lambda end: end.objective)
 
 
 def _same_start(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: Phases) -> FloatArray:
@@ -196,5 +214,9 @@ def is_noise(program: Program, end: Solution) -> bool:
 
 def is_sound(model: Model, fitted: Fitted) -> bool:
     """Whether residuals are noise and no parameter ran into a bound."""
-    inside = not np.any(model.space.at_bounds(fitted.solution.point.theta))
-    return inside and is_noise(fitted.program, fitted.solution)
+    return is_sound_end(model, fitted.program, fitted.solution)
+
+
+def is_sound_end(model: Model, program: Program, end: Solution) -> bool:
+    """Whether the residuals of an end are noise and no parameter ran into a bound."""
+    return not np.any(model.space.at_bounds(end.point.theta)) and is_noise(program, end)
