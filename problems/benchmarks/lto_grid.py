@@ -5,22 +5,27 @@ python problems/benchmarks/lto_grid.py [--seed 1] [--draws 5] [--picture FILE]
 The grid: Tables 2 and 3 vary c0h over [0, c0] and R c1l over [0, c2] (eq. 10 with c2h >= 0); the other numbers follow
 from the curve by eq. 9, the stiffness is that of Table 1, and the stop response is compared with the measured one.
 Spacing: seven values of each. Refinement, as the search for the least distance of eq. 15: seven values of each again
-between the neighbours of the best one, until a spacing is below a thousandth of its range. An evaluation is one
-simulation of one recording; a sweep with sensitivities counts 1 + parameters.
+between the neighbours of the best one, until a spacing is below a thousandth of its range. "Grid, K" searches the
+stiffness, too, seven values evenly in the logarithm over the bounds that identify has: the plant's is that of Table 1
+to the last digit, which no telescope's is, and identify is not told it.
 
-Identify fits all eight numbers, stiffness and scale of the accelerometer included, from curve, start and stop.
+Identify fits all eight numbers, stiffness and scale of the accelerometer included, from curve, start and stop. An
+evaluation is one simulation of one recording; a sweep with sensitivities counts 1 + parameters. What a grid reaches is
+the error of the point that it ends with: it cannot know which of those that it passed was nearest to the truth. Its
+cost is that until its error stays as small; that of identify likewise.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import itertools
 import sys
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from tracing import Trace, counted
@@ -92,7 +97,7 @@ class GridSearch:
         program = free_run(model, model.train, 0.0, Squares(), None)
         return cls(model, curve, program, model.train[0].measured[:, 0], model.train[0].grid.time)
 
-    def values(self, c0h: float, slow_viscous: float) -> Numbers:
+    def values(self, c0h: float, slow_viscous: float, stiffness: float = DATA.leighton.STIFFNESS) -> Numbers:
         """Return all parameters by eq. 9; the scale of the accelerometer follows from the curve's peak."""
         c = self.curve
         return {
@@ -102,7 +107,7 @@ class GridSearch:
             "motor.friction.breaks.0": c["break"],
             "load.friction.tau_c": RATIO * (c["c0"] - c0h),
             "load.friction.viscous": RATIO**2 * slow_viscous,
-            "motor-load.stiffness": DATA.leighton.STIFFNESS,
+            "motor-load.stiffness": stiffness,
             "acceleration.gain": 1.0,
         }
 
@@ -115,28 +120,31 @@ class GridSearch:
         window = (self.time > DATA.STOP_AT - 0.05) & (self.time < DATA.STOP_AT + 3.0)
         return curve_distance(self.time[window], self.measured[window], scale * simulated[window])
 
-    def search(self, trace: Trace, truth: Numbers) -> Numbers:
-        """Return the best parameters of the grid and its refinements."""
-        ranges = [(0.0, self.curve["c0"]), (0.0, self.curve["c2"])]
-        spans = [high - low for low, high in ranges]
-        best, best_misfit = self.values(*(low for low, _ in ranges)), np.inf
+    def search(self, trace: Trace, truth: Numbers, stiffness: bool) -> Numbers:
+        """Return the best parameters of the grid and its refinements; `stiffness` searches that one, too."""
+        spans = [(0.0, self.curve["c0"]), (0.0, self.curve["c2"])]
+        if stiffness:
+            k = self.model.space.names.index("motor-load.stiffness")
+            spans.append((np.log(self.model.space.lower[k]), np.log(self.model.space.upper[k])))
+        ranges, best, best_misfit = spans, (0.0, 0.0), np.inf
         while True:
-            axes = [np.linspace(low, high, VALUES) for low, high in ranges]
-            for c0h in axes[0]:
-                for slow_viscous in axes[1]:
-                    values = self.values(float(c0h), float(slow_viscous))
-                    misfit = self.misfit(values)
-                    if misfit < best_misfit:
-                        best, best_misfit = values, misfit
-                    trace.note(error_of(best, truth))
+            for place in itertools.product(*(np.linspace(low, high, VALUES) for low, high in ranges)):
+                misfit = self.misfit(self._at(place))
+                if misfit < best_misfit:
+                    best, best_misfit = place, misfit
+                trace.note(error_of(self._at(best), truth))
             spacing = [(high - low) / (VALUES - 1) for low, high in ranges]
-            if all(gap < FINEST * span for gap, span in zip(spacing, spans, strict=True)):
-                return best
-            centres = (best["motor.friction.tau_c"], best["load.friction.viscous"] / RATIO**2)
+            if all(gap < FINEST * (high - low) for gap, (low, high) in zip(spacing, spans, strict=True)):
+                return self._at(best)
             ranges = [
-                (max(centre - gap, 0.0), min(centre + gap, span))
-                for centre, gap, span in zip(centres, spacing, spans, strict=True)
+                (max(centre - gap, low), min(centre + gap, high))
+                for centre, gap, (low, high) in zip(best, spacing, spans, strict=True)
             ]
+
+    def _at(self, place: Sequence[float]) -> Numbers:
+        """Return all parameters at a point of the grid: c0h, R c1l and, where it is searched, log K."""
+        c0h, slow_viscous, *log_stiffness = (float(value) for value in place)
+        return self.values(c0h, slow_viscous, *np.exp(log_stiffness))
 
 
 def polyline_of(problem: Problem) -> Numbers:
@@ -151,22 +159,41 @@ def polyline_of(problem: Problem) -> Numbers:
 
 
 @dataclass(frozen=True)
-class Contest:
-    """Both ways on one draw."""
+class Way:
+    """One way to the numbers: what it cost and where it ended."""
 
-    grid: Trace
-    fit: Trace
-    grid_values: Numbers
-    fit_values: Numbers
-    truth: Numbers
-    distance: tuple[float, float]
-    """d of grid and fit on the stop."""
-    held_out: tuple[float, float]
+    points: list[tuple[int, float, float]]
+    """Evaluations, seconds and error of the best parameters so far."""
+    values: Numbers
+    distance: float
+    """d of eq. 15 on the stop."""
+    held_out: float
     """rms error on another stop, rad/s^2."""
+
+    @property
+    def error(self) -> float:
+        """Mean relative error of the judged numbers at the end."""
+        return self.points[-1][2]
+
+
+@dataclass(frozen=True)
+class Contest:
+    """All ways on one draw, by name; identify is the last."""
+
+    ways: dict[str, Way]
+    truth: Numbers
+
+    def cost(self, grid: str, way: str) -> tuple[float, float]:
+        """Return evaluations and seconds that a way needs to where a grid ends; infinite where it never gets there."""
+        level, trace = self.ways[grid].error, Trace(points=self.ways[way].points)
+        return trace.until(level) if self.ways[way].error <= level else (np.inf, np.inf)
+
+
+GRIDS = ("grid", "grid, K")
 
 
 def contest(seed: int) -> Contest:
-    """Run both ways on one draw of the data."""
+    """Run all ways on one draw of the data."""
     telescope = DATA.high_speed_polyline()
     base = load_problem(ROOT / "problems" / "lto" / "joint.yaml")
     uses = tuple(
@@ -176,31 +203,36 @@ def contest(seed: int) -> Contest:
     points = (StaticUse(DATA.curve(telescope, seed + 9)),)
     problem = replace(base, train=uses, static=points, validation=again, static_validation=())
     truth = telescope.truth | {"acceleration.gain": DATA.ACCELEROMETER_GAIN}
-    curve = polyline_of(problem)
-    grid, restore = Trace(), (lambda: None)
-    searching = GridSearch.of(problem, curve)
-    prepare(problem)  # compiles the model, so that neither way is charged for it
-    grid = Trace()
-    restore = counted(grid)
-    grid_values = searching.search(grid, truth)
-    restore()
-    found = Trace()
-    restore = counted(found)
+    searching = GridSearch.of(problem, polyline_of(problem))
+    prepare(problem)  # compiles the model, so that no way is charged for it
+    found: dict[str, tuple[Trace, Numbers]] = {}
+    for name, stiffness in zip(GRIDS, (False, True), strict=True):
+        trace = Trace()
+        restore = counted(trace)
+        found[name] = trace, searching.search(trace, truth, stiffness)
+        restore()
+    found["identify"] = _identified(problem, truth)
+    gain = {"acceleration.gain": found["identify"][1]["acceleration.gain"]}
+    ways = {
+        name: Way(trace.points, values, searching.misfit(values), _held_out(problem, values | gain))
+        for name, (trace, values) in found.items()
+    }
+    return Contest(ways, truth)
+
+
+def _identified(problem: Problem, truth: Numbers) -> tuple[Trace, Numbers]:
+    """Return what one call of identify costs, and its numbers."""
+    names, trace = prepare(problem).space.names, Trace()
+    restore = counted(trace)
 
     def watch(report: Report) -> None:
-        if report.point.theta.size == len(base_names):
-            found.note(error_of(dict(zip(base_names, report.point.theta, strict=True)), truth))
+        if report.point.theta.size == len(names):
+            trace.note(error_of(dict(zip(names, report.point.theta, strict=True)), truth))
 
-    base_names = prepare(problem).space.names
-    found.evaluations, found.begun = 0, time.perf_counter()
-    estimate = identify(problem, watch)
+    values = dict(identify(problem, watch).values)
     restore()
-    fit_values = dict(estimate.values)
-    found.note(error_of(fit_values, truth))
-    gain = {"acceleration.gain": fit_values["acceleration.gain"]}
-    held_out = tuple(_held_out(problem, values | gain) for values in (grid_values, fit_values))
-    distance = (searching.misfit(grid_values), searching.misfit(fit_values))
-    return Contest(grid, found, grid_values, fit_values, truth, distance, (held_out[0], held_out[1]))
+    trace.note(error_of(values, truth))
+    return trace, values
 
 
 def _held_out(problem: Problem, values: Numbers) -> float:
@@ -211,45 +243,62 @@ def _held_out(problem: Problem, values: Numbers) -> float:
     return float(np.sqrt(np.nanmean(errors**2)))
 
 
+def kept(found: Contest) -> dict[str, Any]:
+    """Return a contest as JSON has it."""
+    return asdict(found)
+
+
+def read(record: Mapping[str, Any]) -> Contest:
+    """Return the contest that a record holds."""
+    ways = {
+        name: Way(**way | {"points": [tuple(point) for point in way["points"]]}) for name, way in record["ways"].items()
+    }
+    return Contest(ways, record["truth"])
+
+
+def shares(contests: Sequence[Contest]) -> dict[str, tuple[float, float]]:
+    """Return by grid the median share of its evaluations, and of its time, that identify needs to where it ends."""
+    return {
+        grid: tuple(
+            float(np.median([c.cost(grid, "identify")[k] / c.cost(grid, grid)[k] for c in contests])) for k in (0, 1)
+        )
+        for grid in GRIDS
+    }
+
+
 def rows(contests: Sequence[Contest]) -> list[str]:
     """Return the table, medians over the draws."""
+    names = tuple(contests[0].ways)
 
-    def median(values: Sequence[float]) -> float:
-        return float(np.median(values))
+    def line(text: str, cell: Callable[[Contest, str], float], form: str = ".4g", ways: Sequence[str] = names) -> str:
+        cells = [
+            format(float(np.median([cell(c, way) for c in contests])), form) if way in ways else "" for way in names
+        ]
+        return f"{text:38}" + "".join(f"{text:>12}" for text in cells)
 
-    lines = [f"{'':34} {'grid':>12} {'identify':>12}"]
-    best = [min(point[2] for point in item.grid.points) for item in contests]
-    pairs = [(item.grid.until(level), item.fit.until(level)) for item, level in zip(contests, best, strict=True)]
-    reached = [item.fit.points[-1][2] <= level for item, level in zip(contests, best, strict=True)]
-    table = {
-        "evaluations to the grid's best error": ([p[0][0] for p in pairs], [p[1][0] for p in pairs]),
-        "seconds to the grid's best error": ([p[0][1] for p in pairs], [p[1][1] for p in pairs]),
-        "evaluations in all": ([c.grid.evaluations for c in contests], [c.fit.evaluations for c in contests]),
-        "mean relative error at the end": (
-            [c.grid.points[-1][2] for c in contests],
-            [c.fit.points[-1][2] for c in contests],
-        ),
-        "distance d of eq. 15": ([c.distance[0] for c in contests], [c.distance[1] for c in contests]),
-        "held-out rms, rad/s^2": ([c.held_out[0] for c in contests], [c.held_out[1] for c in contests]),
-    }
-    lines += [f"{name:34} {median(left):12.4g} {median(right):12.4g}" for name, (left, right) in table.items()]
-    lines.append(f"identify ends at or below the grid's best error in {sum(reached)} of {len(reached)} draws")
+    lines = [f"{'':38}" + "".join(f"{name:>12}" for name in names)]
+    for grid in GRIDS:
+        for k, what in enumerate(("evaluations", "seconds")):
+            text = f"{what} to the end of {grid}"
+            lines.append(line(text, lambda c, way, k=k, g=grid: c.cost(g, way)[k], ways=(grid, "identify")))
+    lines += [
+        line("evaluations in all", lambda c, way: c.ways[way].points[-1][0]),
+        line("seconds in all", lambda c, way: c.ways[way].points[-1][1]),
+        line("mean relative error at the end", lambda c, way: c.ways[way].error, ".2%"),
+        line("distance d of eq. 15", lambda c, way: c.ways[way].distance),
+        line("held-out rms, rad/s^2", lambda c, way: c.ways[way].held_out),
+    ]
     for name in JUDGED:
-        left, right = (
-            median(
-                [
-                    abs(numbers_of(values)[name] / numbers_of(c.truth)[name] - 1.0)
-                    for c, values in zip(contests, side, strict=True)
-                ]
-            )
-            for side in ([c.grid_values for c in contests], [c.fit_values for c in contests])
-        )
-        lines.append(f"error of {name:25} {left:12.2%} {right:12.2%}")
+        lines.append(line(f"error of {name}", lambda c, way, name=name: _off(c, way, name), ".2%"))
     return lines
 
 
+def _off(found: Contest, way: str, name: str) -> float:
+    return abs(numbers_of(found.ways[way].values)[name] / numbers_of(found.truth)[name] - 1.0)
+
+
 def draw(contests: Sequence[Contest], path: Path) -> None:
-    """Draw error over evaluations of both ways."""
+    """Draw error over evaluations of all ways."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -257,9 +306,9 @@ def draw(contests: Sequence[Contest], path: Path) -> None:
 
     figure, axes = plt.subplots(figsize=(8, 4.5))
     for index, item in enumerate(contests):
-        for trace, colour, label in ((item.grid, "tab:orange", "grid"), (item.fit, "tab:blue", "identify")):
-            points = np.array(trace.points)
-            axes.loglog(points[:, 0], points[:, 2], color=colour, label=label if index == 0 else None)
+        for (name, way), colour in zip(item.ways.items(), ("tab:orange", "tab:red", "tab:blue"), strict=True):
+            points = np.array(way.points)
+            axes.loglog(points[:, 0], points[:, 2], color=colour, label=name if index == 0 else None)
     axes.set_xlabel("evaluations (a sensitivity sweep counts 1 + parameters)")
     axes.set_ylabel("mean relative error of c0h c1h c2h R c0l R c1l")
     axes.legend()
@@ -274,7 +323,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=5)
     parser.add_argument("--picture", type=Path, default=None)
     asked = parser.parse_args()
-    print(f"grid: {VALUES} x {VALUES} values, refined between neighbours to {FINEST:g} of the range; seed {asked.seed}")
+    print(f"grid: {VALUES} values of each, refined between neighbours to {FINEST:g} of the range; seed {asked.seed}")
     contests = [contest(5000 * asked.seed + 100 * k) for k in range(asked.draws)]
     print("\n".join(rows(contests)))
     if asked.picture is not None:

@@ -2,11 +2,11 @@
 
 python problems/benchmarks/telescope_draws.py [PART ...] [--count N] [--out FOLDER]
 
-Parts: lto (25 draws with the break at the high-speed part, 25 at the low, 10 quadratic, each fitted by all three models,
-the first also with a 3 % prior on the inertia), grid (the paper's grid search beside identify, 25 draws), aries (20 draws
-of all experiments, each direction jointly and in the paper's two steps, then limit cycle and presliding loop simulated
-with what was found). A draw that is on disk is not made again, so that a run can be done in pieces; `--count` stops
-after so many draws of each kind. `acceptance.py telescopes` makes what is missing and prints the lines.
+Parts: lto (25 draws with the break at the high-speed part, 25 at the low, 10 quadratic, each fitted by all three
+models, the first also with a 3 % prior on the inertia), grid (the paper's grid search beside identify, 25 draws), aries
+(20 draws of all experiments, each direction jointly and in the paper's two steps, then limit cycle and presliding loop
+simulated with what was found), starts (joint.yaml and joint_east_west.yaml from 20 random starts each). A draw that is on disk is not made again, so that a run can be done in pieces;
+`--count` stops after so many draws of each kind. `acceptance.py telescopes` makes what is missing and prints the lines.
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import aries_grid
 import lto_grid
-import numpy as np
 
 from friction_ocp.estimation.estimate import Estimate, identify
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
@@ -32,8 +31,8 @@ from friction_ocp.whole_file import write_text
 
 sys.path.insert(0, str(aries_grid.ROOT / "problems" / "aries"))
 
-import cycles  # noqa: E402
-import make_data as aries_data  # noqa: E402
+import cycles
+import make_data as aries_data
 
 FOLDER = Path("results") / "telescopes"
 LTO = aries_grid.ROOT / "problems" / "lto"
@@ -41,8 +40,13 @@ KINDS = {"high": 25, "low": 25, "quadratic": 10}
 """Draws by where the nonlinear part of the friction is."""
 MODELS = {"high": "joint", "low": "low_speed_part", "quadratic": "quadratic_on_polyline"}
 """Problem file of each model."""
-GRID_DRAWS, ARIES_DRAWS = 25, 20
-LTO_SEED, GRID_SEED, ARIES_SEED = 9000, 5000, 100
+GRID_DRAWS, ARIES_DRAWS, STARTS = 25, 20, 20
+LTO_SEED, GRID_SEED, ARIES_SEED, START_SEED = 9000, 5000, 100, 1
+STARTED = {
+    "lto": LTO / "joint.yaml",
+    "aries": aries_grid.ROOT / "problems" / "aries" / "joint_east_west.yaml",
+}
+"""Problems that are fitted from random starts."""
 Record = Mapping[str, Any]
 
 
@@ -79,8 +83,7 @@ def lto_draw(kind: str, number: int) -> Record:
 
 def grid_draw(number: int) -> Record:
     """Run the grid search and identify on one draw."""
-    found = lto_grid.contest(GRID_SEED + 100 * number)
-    return lto_grid.kept(found)
+    return lto_grid.kept(lto_grid.contest(GRID_SEED + 100 * number))
 
 
 def aries_draw(number: int) -> Record:
@@ -107,6 +110,19 @@ def _side(direction: str, curves: Mapping[str, Any], made: Mapping[str, Any]) ->
     return {"joint": joint, "two_steps": steps}
 
 
+def start_draw(telescope: str, number: int) -> Record:
+    """Fit a problem from one random start."""
+    end = random_starts.run_start(random_starts.Job(STARTED[telescope], START_SEED, number))
+    return asdict(end) | {"theta": end.theta.tolist(), "std_error": end.std_error.tolist()}
+
+
+def end_of(record: Record) -> random_starts.End:
+    """Return where the start of a record led."""
+    kept = {name: value for name, value in record.items() if name != "code"}
+    arrays = {name: np.array(kept[name], dtype=float) for name in ("theta", "std_error")}
+    return random_starts.End(**kept | arrays | {"verdicts": tuple(kept["verdicts"])})
+
+
 def parts() -> dict[str, list[tuple[str, Callable[[], Record]]]]:
     """Return the draws of every part: name and what makes it; kinds take turns, so that a part of them is fair."""
     lto = [(number, kind) for kind, count in KINDS.items() for number in range(count)]
@@ -114,6 +130,9 @@ def parts() -> dict[str, list[tuple[str, Callable[[], Record]]]]:
         "lto": [(f"lto-{kind}-{n:02d}", lambda kind=kind, n=n: lto_draw(kind, n)) for n, kind in sorted(lto)],
         "grid": [(f"grid-{n:02d}", lambda n=n: grid_draw(n)) for n in range(GRID_DRAWS)],
         "aries": [(f"aries-{n:02d}", lambda n=n: aries_draw(n)) for n in range(ARIES_DRAWS)],
+        "starts": [
+            (f"start-{key}-{n:02d}", lambda key=key, n=n: start_draw(key, n)) for n in range(STARTS) for key in STARTED
+        ],
     }
 
 
