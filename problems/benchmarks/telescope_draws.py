@@ -5,8 +5,9 @@ python problems/benchmarks/telescope_draws.py [PART ...] [--count N] [--out FOLD
 Parts: lto (25 draws with the break at the high-speed part, 25 at the low, 10 quadratic, each fitted by all three
 models, the first also with a 3 % prior on the inertia), grid (the paper's grid search beside identify, 25 draws), aries
 (20 draws of all experiments, each direction jointly and in the paper's two steps, then limit cycle and presliding loop
-simulated with what was found), starts (joint.yaml and joint_east_west.yaml from 20 random starts each). A draw that is on disk is not made again, so that a run can be done in pieces;
-`--count` stops after so many draws of each kind. `acceptance.py telescopes` makes what is missing and prints the lines.
+simulated with what was found), starts (joint.yaml and joint_east_west.yaml from 20 random starts each). A draw that is
+on disk is not made again, so that a run can be done in pieces; `--count` stops after so many draws of each kind.
+`acceptance.py telescopes` makes what is missing and prints the lines.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from typing import Any
 
 import aries_grid
 import lto_grid
+import numpy as np
+import random_starts
 
 from friction_ocp.estimation.estimate import Estimate, identify
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
