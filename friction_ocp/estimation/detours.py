@@ -42,10 +42,13 @@ KEPT = Persistence(8, 24, Tolerances(decrease=1e-6, progress=1e-5))
 
 
 def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
-    """Leave an end at a kink of exact friction: through the same program with a smoothed sign, and back."""
+    """Leave an end that exact friction makes: through the same program with a smoothed sign, and back.
+
+    Between two kinks there may be an end that is smooth by itself, and near the best one: one detour is always made.
+    """
     program, best = fitted.program, fitted.solution
-    for width in DETOURS:
-        if best.smooth or not isinstance(program.loss, Squares):
+    for number, width in enumerate(DETOURS):
+        if (number > 0 and best.smooth) or not isinstance(program.loss, Squares):
             break
         watch = phases.begin(f"detour, smoothing {width:g}")
         rounded = replace(program, width=width * model.speed_scale)
