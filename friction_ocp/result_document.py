@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.estimation.agreement import Coherence, coherence
 from friction_ocp.estimation.curves import FrictionCurve
 from friction_ocp.estimation.estimate import Estimate, ParameterEstimate, Simulation
 from friction_ocp.estimation.noise import NoiseLevel
@@ -27,6 +28,8 @@ from friction_ocp.simulation.grid import FloatArray
 
 FORMAT = "friction-ocp-result/1"
 SIMULATION_FORMAT = "friction-ocp-simulation/1"
+FREQUENCIES, FEWEST_SAMPLES = 200, 64
+"""Frequencies that a coherence is kept at, and samples from which there is one."""
 
 
 def number(value: float) -> float | None:
@@ -67,6 +70,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             recording: {channel: _whiteness(test) for channel, test in tests.items()}
             for recording, tests in estimate.residuals.items()
         },
+        "coherence": _coherences(estimate.simulation),
         "channel_units": dict(estimate.simulation.units),
         "provenance": provenance(estimate.problem, "identify"),
     }
@@ -82,6 +86,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "warnings": [],
         "parameters": {},
         "fit": _fit(simulation),
+        "coherence": _coherences(simulation),
         "channel_units": dict(simulation.units),
         "provenance": provenance(simulation.problem, "simulate"),
     }
@@ -140,6 +145,28 @@ def _fit(simulation: Simulation) -> dict[str, Any]:
         "train": table(simulation.train_errors),
         "validation": table(simulation.validation_errors),
         "static": {item.name: _static(item) for item in simulation.static},
+    }
+
+
+def _coherences(simulation: Simulation) -> dict[str, Any]:
+    """Return by recording and channel how far the measurement depends linearly on the free run, over frequency."""
+    told: dict[str, Any] = {}
+    for run in (*simulation.train, *simulation.validation):
+        columns = {name: run.measured[:, k] for k, name in enumerate(simulation.units)}
+        told[run.name] = {
+            name: _coherence(coherence(run.time, measured, run.simulated[:, k]))
+            for k, (name, measured) in enumerate(columns.items())
+            if np.isfinite(measured).sum() >= FEWEST_SAMPLES
+        }
+    return told
+
+
+def _coherence(found: Coherence) -> dict[str, Any]:
+    shown = found.thinned(FREQUENCIES)
+    return {
+        "frequency_hz": _numbers(shown.frequency[1:]),
+        "share": _numbers(shown.share[1:]),
+        "explained": number(found.explained),
     }
 
 

@@ -28,10 +28,26 @@ class Coherence:
     """(n,) Hz."""
     share: FloatArray
     """(n,) 0 to 1."""
+    power: FloatArray
+    """(n,) share of each frequency in the power of the measured signal about its mean."""
 
-    def mean(self, weight: FloatArray) -> float:
-        """Return the share over all frequencies, weighted."""
-        return float(np.sum(self.share * weight) / np.sum(weight))
+    @property
+    def explained(self) -> float:
+        """Share of the measured signal's power that depends linearly on the simulated one."""
+        return float(np.sum(self.share * self.power))
+
+    def thinned(self, points: int) -> Coherence:
+        """Return at most `points` frequencies, each standing for neighbours whose width grows with the frequency."""
+        if self.frequency.size <= points:
+            return self
+        bins = np.unique(np.round(np.geomspace(1, self.frequency.size, points)).astype(np.int64) - 1)
+        power = np.add.reduceat(self.power, bins)
+        weight = np.maximum(power, np.finfo(np.float64).tiny)
+        frequency, share = (
+            np.add.reduceat(values * np.maximum(self.power, np.finfo(np.float64).tiny), bins) / weight
+            for values in (self.frequency, self.share)
+        )
+        return Coherence(frequency, share, power)
 
 
 def coherence(time: FloatArray, measured: FloatArray, simulated: FloatArray) -> Coherence:
@@ -43,7 +59,9 @@ def coherence(time: FloatArray, measured: FloatArray, simulated: FloatArray) -> 
     length = max(8, 2 * grid.size // (SEGMENTS + 1))
     rate = (grid.size - 1) / (grid[-1] - grid[0])
     frequency, share = signal.coherence(first, second, rate, nperseg=length)
-    return Coherence(np.asarray(frequency), np.nan_to_num(np.asarray(share)))
+    _, power = signal.welch(first, rate, nperseg=length)
+    total = max(float(np.sum(power)), np.finfo(np.float64).tiny)
+    return Coherence(np.asarray(frequency), np.nan_to_num(np.asarray(share)), np.asarray(power) / total)
 
 
 def _even(time: FloatArray, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

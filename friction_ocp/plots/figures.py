@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from friction_ocp.plots.bootstrap import bootstrap_figure
+from friction_ocp.plots.coherence import coherence_figure
 from friction_ocp.plots.comparison import comparison_figure
 from friction_ocp.plots.correlation import correlation_figure
 from friction_ocp.plots.curves import friction_figures
@@ -48,6 +49,9 @@ def _figures(result: Mapping[str, Any], series: Series) -> Iterator[tuple[str, F
     yield from ((f"friction-{shaft}", figure) for shaft, figure in friction_figures(rows(result, "friction_curves")))
     if any(objects(result, "residuals").values()):
         yield "residual-autocorrelation", whiteness_figure(objects(result, "residuals"))
+    coherences = {name: objects(part(result, "coherence"), name) for name in part(result, "coherence")}
+    if any(coherences.values()):
+        yield "coherence", coherence_figure({name: found for name, found in coherences.items() if found})
     if rows(part(result, "correlation"), "names"):
         yield "correlation", correlation_figure(part(result, "correlation"))
 

@@ -15,7 +15,13 @@ from friction_ocp.plots.numbers import plain, significant
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.plots.series import Series
 from friction_ocp.report.compensation import compensation_section
-from friction_ocp.report.payload import embedded_json, friction_payload, recording_payload, residual_payload
+from friction_ocp.report.payload import (
+    coherence_payload,
+    embedded_json,
+    friction_payload,
+    recording_payload,
+    residual_payload,
+)
 from friction_ocp.report.statistics import drawn_section, whole_verdict
 from friction_ocp.report.tables import (
     SPLITS,
@@ -39,6 +45,7 @@ class EmbeddedRecording:
     split: str
     traces: str
     residuals: str
+    coherence: str
 
 
 def write_report(result: Json, series: Series, path: Path) -> None:
@@ -75,6 +82,7 @@ def render_report(result: Json, series: Series) -> str:
             "friction_json": embedded_json(friction),
             "compensation": compensation_section(result),
             "residuals": objects(result, "residuals"),
+            "coherence": any(objects(result, "coherence").values()),
             "correlation": correlation_rows(part(result, "correlation")),
             "solver": facts(solver),
             "provenance": facts(provenance),
@@ -119,7 +127,7 @@ def render_page(template: str, context: Mapping[str, Any]) -> str:
 def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
     """Return the recordings in the order of the result, then any that only the series have."""
     splits = {str(name): split for key, split in SPLITS.items() for name in rows(part(result, "recordings"), key)}
-    units, residuals = part(result, "channel_units"), part(result, "residuals")
+    units, residuals, coherence = (part(result, key) for key in ("channel_units", "residuals", "coherence"))
     return [
         EmbeddedRecording(
             index,
@@ -127,6 +135,7 @@ def _recordings(result: Json, series: Series) -> list[EmbeddedRecording]:
             splits.get(name, "other"),
             embedded_json(recording_payload(series.get(name, {}), units)),
             embedded_json(residual_payload(objects(residuals, name))),
+            embedded_json(coherence_payload(objects(coherence, name))),
         )
         for index, name in enumerate(dict.fromkeys([*splits, *series]))
     ]

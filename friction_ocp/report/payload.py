@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.plots.curves import curve_label
-from friction_ocp.plots.numbers import unit_text
+from friction_ocp.plots.numbers import percent, unit_text
 from friction_ocp.plots.reading import Json
 from friction_ocp.plots.series import ChannelColumns, rounded, traces_of
 
@@ -69,6 +69,19 @@ def residual_payload(channels: Mapping[str, Json]) -> list[dict[str, Any]]:
             "white": bool(residual.get("white")),
         }
         for name, residual in channels.items()
+    ]
+
+
+def coherence_payload(channels: Mapping[str, Json]) -> list[dict[str, Any]]:
+    """Return the coherences of one recording."""
+    return [
+        {
+            "name": name,
+            "frequency": _rounded(found.get("frequency_hz")),
+            "share": _rounded(found.get("share"), 4),
+            "explained": percent(found.get("explained")),
+        }
+        for name, found in channels.items()
     ]
 
 

@@ -134,6 +134,22 @@
     };
   }
 
+  function coherenceFigure(found) {
+    return {
+      title: found.name + ": " + found.explained,
+      label: "Coherence of measured and simulated " + found.name + " over the frequency",
+      height: 290,
+      data: [{
+        type: "scatter", mode: "lines", name: "coherence", x: found.frequency, y: found.share,
+        meta: "simulated", line: { color: colour("simulated"), width: 1.6 }, hovertemplate: "%{y:.3f}",
+      }],
+      layout: {
+        xaxis: axis("frequency in Hz", { type: "log", zeroline: false }),
+        yaxis: axis("coherence", { range: [-0.02, 1.05] }),
+      },
+    };
+  }
+
   function frame(holder, figure) {
     const element = document.createElement("figure");
     const heading = document.createElement("h3");
@@ -174,7 +190,7 @@
     }));
   }
 
-  const figures = { traces: tracesFigure, residuals: residualFigure };
+  const figures = { traces: tracesFigure, residuals: residualFigure, coherence: coherenceFigure };
   const holder = (kind) => document.querySelector(`[data-plots="${kind}"]`);
   const clear = (element) => {
     element.querySelectorAll(".plot").forEach((plot) => Plotly.purge(plot));

@@ -20,6 +20,17 @@ def test_a_filtered_signal_is_coherent_where_it_has_power(rng_seed: int = 0) -> 
     assert np.mean(shared) == pytest.approx(0.5, abs=0.1)
 
 
+def test_the_explained_power_is_that_of_the_copy_and_survives_thinning() -> None:
+    """A tone that the simulation has, beside a weaker one that it lacks, explains its own share of the power."""
+    rng = np.random.default_rng(1)
+    with_it, without = np.sin(2 * np.pi * 2.0 * TIME), 0.5 * np.sin(2 * np.pi * 11.0 * TIME + 1.0)
+    found = coherence(TIME, with_it + without, with_it + 1e-3 * rng.standard_normal(TIME.size))
+    assert found.explained == pytest.approx(0.8, abs=0.05)
+    thin = found.thinned(40)
+    assert thin.frequency.size <= 40 and np.all(np.diff(thin.frequency) > 0)
+    assert thin.explained == pytest.approx(found.explained, rel=1e-9)
+
+
 def test_missing_samples_are_bridged() -> None:
     """Gaps do not spread."""
     wave = np.sin(2 * np.pi * 3.0 * TIME) * np.exp(-0.2 * TIME)

@@ -10,6 +10,7 @@ from lto_cases import REPOSITORY, script
 
 from friction_ocp import Estimate, check, identify, load_problem
 from friction_ocp.estimation.problem import RecordingUse, StaticUse
+from friction_ocp.result_document import estimate_document
 
 LTO = REPOSITORY / "problems" / "lto"
 DATA = script("lto", "make_data")
@@ -68,6 +69,15 @@ def test_curve_and_responses_together_tell_how_friction_is_distributed() -> None
         table["acceleration"] for table in (estimate.simulation.train_errors, estimate.simulation.validation_errors)
     )
     assert training.noise_ratio < 1.1 and held_out.noise_ratio < 1.1
+    assert_coherent(estimate, "stop_again")
+
+
+def assert_coherent(estimate: Estimate, recording: str) -> None:
+    """Assert that a stop curve and its simulation are as one at the mode of 6.24 Hz, as Figs. 13, 19 and 21 show."""
+    found = estimate_document(estimate)["coherence"][recording]["acceleration"]
+    frequency, share = np.array(found["frequency_hz"]), np.array(found["share"])
+    assert np.all(share[(frequency > 3.0) & (frequency < 9.0)] > 0.99)
+    assert found["explained"] > 0.99
 
 
 @pytest.mark.slow
@@ -94,7 +104,9 @@ def test_the_ranges_of_equation_10_do_not_move_an_estimate_inside_them() -> None
 @pytest.mark.slow
 def test_the_parabola_is_refined_by_curve_and_stop_together() -> None:
     """Eq. 16: 0.13, 0.0042, -1.147e-5 in the fast part, 0.00537 and 0.000786 in the slow one."""
-    assert_close(fitted("quadratic"), DATA.quadratic().truth, {"load.friction.tau_c": 0.1})
+    estimate = fitted("quadratic")
+    assert_close(estimate, DATA.quadratic().truth, {"load.friction.tau_c": 0.1})
+    assert_coherent(estimate, "stop")
 
 
 @pytest.mark.slow

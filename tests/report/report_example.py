@@ -130,6 +130,19 @@ def residuals(names: list[str]) -> dict[str, Any]:
     }
 
 
+def coherence(names: list[str]) -> dict[str, Any]:
+    """Return coherences that fall where noise takes over."""
+    frequency = np.geomspace(0.05, 100.0, 120)
+    share = {"motor_position": 1.0 / (1.0 + (frequency / 3.0) ** 4), "load_acceleration": np.exp(-frequency / 30.0)}
+    return {
+        name: {
+            channel: {"frequency_hz": frequency.tolist(), "share": values.tolist(), "explained": float(values[20])}
+            for channel, values in share.items()
+        }
+        for name in names
+    }
+
+
 def correlation(names: list[str], seed: int = 5) -> dict[str, Any]:
     """Return a matrix in which two of the parameters trade."""
     random = np.random.default_rng(seed)
@@ -166,6 +179,7 @@ def identified(samples: int = 12000) -> tuple[Result, Series]:
         "correlation": correlation(list(parameters())),
         "friction_curves": friction_curves(),
         "residuals": residuals([*train, *validation]),
+        "coherence": coherence([*train, *validation]),
         "solver": {
             "name": "gauss_newton",
             "iterations": 9,

@@ -25,7 +25,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def test_every_figure_is_written_as_png_and_svg(written: list[Path]) -> None:
     """One pair a recording, a shaft and a table, none of them empty."""
     stems = ["parameters", "traces-staircase", "traces-stop", "traces-reversals", "friction-motor", "friction-load"]
-    stems += ["residual-autocorrelation", "correlation"]
+    stems += ["residual-autocorrelation", "coherence", "correlation"]
     assert [path.name for path in written] == [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
     for path in written:
         content = path.read_bytes()
@@ -63,7 +63,7 @@ def test_gaps_nulls_and_zeros_are_drawn_around(tmp_path: Path) -> None:
     del result["residuals"]["stop.h5"]["motor_position"]
     result["friction_curves"][0] |= {"lower": None, "upper": None}
     empty = {name: np.full(5, np.nan) for name in ("measured", "simulated")} | {"time": np.arange(5.0)}
-    assert len(write_figures(result, {"a": {"b": empty}}, tmp_path)) == 12
+    assert len(write_figures(result, {"a": {"b": empty}}, tmp_path)) == 14
 
 
 def test_a_curve_is_named_by_what_tells_it_from_the_others() -> None:

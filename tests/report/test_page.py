@@ -91,6 +91,7 @@ def test_the_sections_come_in_the_order_of_a_readers_questions(page: str) -> Non
         "parameters",
         "fit",
         "traces",
+        "coherence",
         "friction",
         "residuals",
         "correlation",
