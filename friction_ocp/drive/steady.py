@@ -44,27 +44,26 @@ def steady_speeds(drive: Drive) -> dict[str, float]:
     return {name: float(joined.speed_ratio[name] / joined.speed_ratio[reference]) for name in members}
 
 
-def steady_drive(drive: Drive, effort: Effort) -> SteadyDrive:
+def steady_drive(drive: Drive, effort: Effort, placed: bool = False) -> SteadyDrive:
     """Return the effort that each motor's command has at constant speed, so that all together overcome the friction.
 
-    A motor takes its `share` of the command, so that equal motors get their mean. Gravity counts at the angle; waves
-    over the angle average out over whole turns, and the drive is as at the start of its warm-up.
+    A motor takes its `share` of the command, so that equal motors get their mean. Gravity counts at the angle, and so
+    does, where the efforts are `placed` at angles, the wave of a friction over them; other waves average out over whole
+    turns, and the drive is as at the start of its warm-up.
     """
-    mech = mechanism(_averaged(drive))
+    mech = mechanism(_averaged(drive, placed))
     omega, theta = ca.SX.sym("omega"), ca.SX.sym("theta")
     value = _balanced(mech, reference_shaft(drive), effort, omega, theta)
     numbers = column(list(mech.parameters.values()))
     return SteadyDrive(ca.Function("effort", [omega, theta, numbers], [value]), tuple(mech.parameters))
 
 
-def _averaged(drive: Drive) -> Drive:
-    """Return the drive without springs, play, waves, warm-up and anything that is recorded."""
+def _averaged(drive: Drive, placed: bool) -> Drive:
+    """Return the drive without springs, play, waves, warm-up and anything that is recorded; `placed` keeps ripples."""
+    kept = {"warm_up": None} if placed else {"warm_up": None, "ripple": None}
     return replace(
         drive,
-        shafts=tuple(
-            replace(item, disturbance=None, friction=replace(item.friction, ripple=None, warm_up=None))
-            for item in drive.shafts
-        ),
+        shafts=tuple(replace(item, disturbance=None, friction=replace(item.friction, **kept)) for item in drive.shafts),
         transmissions=tuple(
             replace(
                 item, stiffness=None, damping=0.0, backlash=0.0, stiffening=0.0, hysteresis=None, kinematic_error=None
@@ -90,7 +89,9 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
     at = Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0))
     torques = applied_torques(mech, at, 0.0)
     friction = {
-        item.name: item.friction.torque(mech.shaft_speed(item.name, at), transmitted_torque(mech, item, load))
+        item.name: item.friction.under(mech.surroundings(item, at)).torque(
+            mech.shaft_speed(item.name, at), transmitted_torque(mech, item, load)
+        )
         for item in mech.drive.shafts
     }
     resisting = [topology.speed_ratio[name] * (friction[name] - torques[name]) for name in topology.members(group)]

@@ -151,7 +151,8 @@ def has_nested(problem: Problem) -> bool:
 def nested_space(problem: Problem, space: ParameterSpace) -> ParameterSpace:
     """Return the space of the simpler model that is fitted first; the same space where there is none.
 
-    Its friction has no Stribeck part, no curvature: what the fields of the laws declare as `nested`.
+    Its friction has no Stribeck part, no curvature: what the fields of the laws declare as `nested`. A simpler model
+    of which nothing would be left to fit is none.
     """
     leaves = {leaf.path: leaf for leaf in drive_leaves(problem.drive)}
     values = {path: leaf.value for path, leaf in leaves.items()}
@@ -164,6 +165,8 @@ def nested_space(problem: Problem, space: ParameterSpace) -> ParameterSpace:
         return space
     drive = bind_drive(problem.drive, values | simpler)
     simple = parameter_space(replace(problem, drive=drive, constraints=()), space.leaf_names, space.active)
+    if not simple.names:
+        return space
     start = dict(zip(space.names, space.guess, strict=True))
     return simple.moved(np.array([start[name] for name in simple.names]))
 

@@ -32,9 +32,9 @@ class Probe:
 
 
 def probes(program: Program, point: Point, system: Linearisation, drive: Drive) -> tuple[Probe, ...]:
-    """Return every channel that could be added to a drive, each with what it would add."""
+    """Return every channel that could be added to recordings of a drive, each with what it would add."""
     wanted = _unmeasured(drive)
-    if not wanted:
+    if not wanted or not program.experiments:
         return ()
     added = tuple(Channel(f"probe {measures}", measures) for measures in wanted)
     sensed = stepped(replace(drive, channels=(*drive.channels, *added)))

@@ -144,7 +144,7 @@ def _moving(points: StaticPoints, speed: FloatArray) -> FloatArray:
 def _function(
     drive: Drive, effort: Effort, space: ParameterSpace, speed: FloatArray, position: FloatArray | None
 ) -> ca.Function:
-    steady = steady_drive(drive, effort)
+    steady = steady_drive(drive, effort, position is not None)
     numbers = ca.SX.sym("numbers", len(space.leaf_names))
     place = {name: k for k, name in enumerate(space.leaf_names)}
     own = ca.vertcat(*[numbers[place[name]] for name in steady.parameter_names])

@@ -7,6 +7,8 @@ curve: 30 speeds x 5 positions x 4 passes x 2 directions under the loop, 10 ms l
 run. A run whose speed swings by more than a fifth of its mean is a limit cycle, and so is one slower than five counts
 of the loop's encoder in a sample: the loop then hunts from count to count, faster than the noisy log shows.
 `curve_<direction>.h5` leaves these out, `curve_all_<direction>.h5` averages them too, as the paper does.
+places: mean torque at two speeds and 41 positions, both directions, on an axis whose dry friction has a wave over one
+turn of the friction roller. dwell: torque at which slow ramps break away, after rests of 1 s to 1000 s.
 responses: torque steps and a slow ramp at 1 ms, a step logged at 10 ms, a slow loop below breakaway, and speed runs.
 """
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import aries  # noqa: E402
-from plant import Trajectory  # noqa: E402
+from plant import Plant, PlantFriction, PlantRipple, Trajectory  # noqa: E402
 
 from friction_ocp.recording.hdf5 import write_recording, write_static_points  # noqa: E402
 from friction_ocp.recording.recording import Channel, Recording  # noqa: E402
@@ -37,6 +40,16 @@ SWING = 0.2
 """Deviation of the speed over its mean from which a run is a limit cycle."""
 SPEED_NOISE = 0.05
 """Noise of the speed over its mean that the angle is averaged down to, to see the swing."""
+EVEN_SPEEDS, PLACES = (1.2e-2, 2.4e-2), np.radians(np.linspace(-60.0, 60.0, 41))
+"""rad/s beyond the Stribeck part, and rad."""
+HELD = 0.25
+"""s that a run is averaged over at a place: it moves by less than a fortieth of the wave."""
+ROLLER, WAVE = 2.0 * np.pi / 24.5, (0.04, -0.025)
+"""Turn of the friction roller on the axis, rad; cosine and sine of the wave over it in the dry friction."""
+RESTS, LONG_REST, AGEING = (1.0, 10.0, 100.0, 1000.0), 100.0, 0.05
+"""s at rest before a ramp, the rest for which T_S is that of Table 1, and by how much of it T_S grows in a decade."""
+RAMP_FROM, RAMP_RATE, MOVED = 1000.0, 10.0, 1e-4
+"""N m and N m/s of the ramp, and rad after which an axis has broken away."""
 SOURCE = "problems/aries/make_data.py"
 
 
@@ -112,6 +125,75 @@ def recording(name: str, title: str, seed: int, channels: dict[str, tuple[np.nda
     }
     text = f"ARIES Schmidt telescope, {title}, simulated"
     return Recording(name, made, title=text, source=f"{SOURCE}, seed {seed}", licence="MIT")
+
+
+def places(seed: int) -> dict[str, StaticPoints]:
+    """Return the mean torque over position of an axis with a wave in its dry friction, both directions in one."""
+    rng = np.random.default_rng([seed, 3])
+    plain = aries.axis(SLOW_LOG)
+    plant = replace(plain, shafts=(replace(plain.shafts[0], ripple=PlantRipple(ROLLER, *WAVE)),))
+    rows = []
+    for speed in (sign * size for sign in DIRECTIONS.values() for size in EVEN_SPEEDS):
+        for place in PLACES:
+            start = {"axis.theta": place, "axis.omega": speed}
+            logs = [
+                plant.simulate(2.0, {"reference.omega": speed}, rng, step=aries.PLANT_STEP, initial=start).channels
+                for _ in range(PASSES)
+            ]
+            late = logs[0]["position"][0] > 2.0 - HELD
+            torque = [np.mean(log["torque"][1][late]) for log in logs]
+            rows.append((speed, np.mean(torque), np.mean(logs[0]["position"][1][late]), np.var(torque, ddof=1)))
+    speed, torque, position, variance = np.array(rows).T
+    error = np.sqrt(np.mean(variance) / PASSES)
+    points = StaticPoints(
+        "places",
+        speed,
+        {"speed": "rad/s", "torque": "N m", "std_error": "N m", "position": "rad", "runs": "1"},
+        torque=torque,
+        std_error=np.full(speed.size, error),
+        position=position,
+        runs=np.full(speed.size, float(PASSES)),
+        title="ARIES Schmidt telescope, mean torque over position, simulated",
+        source=f"{SOURCE}, seed {seed}",
+        licence="MIT",
+    )
+    return {points.name: points}
+
+
+def dwells(seed: int) -> dict[str, StaticPoints]:
+    """Return the torque at which slow ramps break away, after rests of different length, in both directions."""
+    found: dict[str, StaticPoints] = {}
+    for rest in RESTS:
+        numbers = dict(aries.NUMBERS)
+        numbers["tau_s"] = tuple(value * (1.0 + AGEING * np.log10(rest / LONG_REST)) for value in numbers["tau_s"])
+        plain = aries.axis(SLOW_LOG, looped=False)
+        friction = PlantFriction("lugre", delta=aries.DELTA, **numbers)
+        plant = replace(plain, shafts=(replace(plain.shafts[0], friction=friction),))
+        name, rng = f"dwell_{rest:g}", np.random.default_rng([seed, 5, int(rest)])
+        rows = [(sign, breakaway(plant, sign, rng)) for sign in DIRECTIONS.values() for _ in range(PASSES)]
+        direction, torque = np.array(rows).T
+        spread = np.mean([np.std(torque[direction == sign], ddof=1) for sign in DIRECTIONS.values()])
+        found[name] = StaticPoints(
+            name,
+            np.zeros(torque.size),
+            {"speed": "rad/s", "torque": "N m", "std_error": "N m", "direction": "1"},
+            torque=torque,
+            std_error=np.full(torque.size, spread),
+            direction=direction,
+            title=f"ARIES Schmidt telescope, breakaway after a rest of {rest:g} s, simulated",
+            source=f"{SOURCE}, seed {seed}",
+            licence="MIT",
+        )
+    return found
+
+
+def breakaway(plant: Plant, sign: float, rng: np.random.Generator) -> float:
+    """Return the size of the torque, on a slow ramp, at which an axis has moved by MOVED."""
+    end = (1700.0 - RAMP_FROM) / RAMP_RATE
+    ramp = corners((0.0, 0.0), (2.0, sign * RAMP_FROM), (2.0 + end, sign * 1700.0))
+    log = plant.simulate(2.0 + end, {"motor.torque": ramp}, rng, step=2e-5).channels
+    moved = np.abs(log["position"][1]) > MOVED
+    return float(np.abs(log["torque"][1][np.argmax(moved)]))
 
 
 def open_loop(name: str, title: str, seed: int, torque: Trajectory, period: float) -> Recording:
@@ -195,7 +277,12 @@ def main() -> None:
     """Write all parts, or one of them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
-    parts: dict[str, Callable[[int, Path], None]] = {"curve": _write_curves, "responses": _write_responses}
+    parts: dict[str, Callable[[int, Path], None]] = {
+        "curve": lambda seed, folder: _write_points(curves(seed), folder),
+        "places": lambda seed, folder: _write_points(places(seed), folder),
+        "dwell": lambda seed, folder: _write_points(dwells(seed), folder),
+        "responses": lambda seed, folder: _write_recordings(responses(seed), folder),
+    }
     parser.add_argument("--only", choices=parts, default=None)
     asked = parser.parse_args()
     folder = ROOT / "data" / "aries"
@@ -205,14 +292,14 @@ def main() -> None:
             write(asked.seed, folder)
 
 
-def _write_curves(seed: int, folder: Path) -> None:
-    for name, points in curves(seed).items():
+def _write_points(made: dict[str, StaticPoints], folder: Path) -> None:
+    for name, points in made.items():
         write_static_points(points, folder / f"{name}.h5")
 
 
-def _write_responses(seed: int, folder: Path) -> None:
-    for made in responses(seed):
-        write_recording(made, folder / f"{made.name}.h5")
+def _write_recordings(made: list[Recording], folder: Path) -> None:
+    for item in made:
+        write_recording(item, folder / f"{item.name}.h5")
 
 
 if __name__ == "__main__":

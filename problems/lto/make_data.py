@@ -1,16 +1,19 @@
 """Make data/lto: the Leighton 10 m telescope as the plant of the tests has it, with the numbers of its paper.
 
-python problems/lto/make_data.py [--seed 1]. Two motors on one bull gear, each with its own reducer. The curve: both
-motors held at 20 speeds by speed loops, their currents read 25 times, each reading with a scatter of 3e-3 N m, and
-averaged. Start and stop: both motors follow a step of speed kinematically, as in eq. 12 and Fig. 11 of the paper; an
-accelerometer of unknown scale on the reflector is logged at 100 Hz with 4e-3 rad/s^2 of noise.
+python problems/lto/make_data.py [--seed 1] [--only PART]
+
+Two motors on one bull gear, each with its own reducer. The curve: both motors held at 20 speeds by speed loops, their
+currents read 25 times, each reading with a scatter of 3e-3 N m, and averaged. Start and stop: both motors follow a step
+of speed kinematically, as in eq. 12 and Fig. 11 of the paper; an accelerometer of unknown scale on the reflector is
+logged at 100 Hz with 4e-3 rad/s^2 of noise. Families: the curve again while a torque on the structure loads the gears,
+whose friction grows with what they transmit.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +56,8 @@ class Telescope:
     """On its own shaft, twice that of one chain."""
     truth: dict[str, float]
     """By the parameter names of the problem files; of one chain."""
+    pull: float = 0.0
+    """N m; torque on the whole structure against the motion."""
 
 
 def high_speed_polyline(c2h: float = 0.000117) -> Telescope:
@@ -101,6 +106,21 @@ def quadratic() -> Telescope:
     return Telescope("quadratic", fast, leighton.slow_friction(0.00537, 0.000786, chains=2), truth)
 
 
+LOADS = {"light": 0.0, "medium": 4000.0, "heavy": 8000.0}
+"""N m on the structure, by member of the family."""
+LOAD_COULOMB, LOAD_VISCOUS = 0.08, 5e-4
+"""Shares of the transmitted torque, 1 and s/rad, by which the fast part's friction grows; the paper has a picture."""
+
+
+def family(load: str) -> Telescope:
+    """Return the refined model of eq. 16 with friction of the fast part that grows with the load (Fig. 18)."""
+    plain = quadratic()
+    fast = replace(plain.fast, load_coulomb=LOAD_COULOMB, load_viscous=LOAD_VISCOUS)
+    truth = {name: value for name, value in plain.truth.items() if name.startswith("motor.")}
+    truth |= {"motor.friction.load.coulomb": LOAD_COULOMB, "motor.friction.load.viscous": LOAD_VISCOUS}
+    return Telescope(load, fast, plain.slow, truth, LOADS[load])
+
+
 TELESCOPES = (high_speed_polyline, low_speed_polyline, quadratic)
 
 
@@ -108,7 +128,7 @@ def plant_of(telescope: Telescope, looped: bool = False) -> Plant:
     """Return both chains; `looped` puts each motor under a speed loop, else its speed is prescribed."""
     shafts = (
         *(PlantShaft(side, leighton.MOTOR_INERTIA, telescope.fast) for side in SIDES),
-        PlantShaft("load", leighton.LOAD_INERTIA, telescope.slow),
+        PlantShaft("load", leighton.LOAD_INERTIA, telescope.slow, external_torque=-telescope.pull),
     )
     joints = tuple(PlantTransmission(side, "load", leighton.RATIO, leighton.STIFFNESS) for side in SIDES)
     accelerometer = PlantSensor(
@@ -173,10 +193,19 @@ def response(telescope: Telescope, kind: str, seed: int, name: str) -> Recording
 
 
 def main() -> None:
-    """Write a curve and two pairs of responses for each telescope."""
+    """Write curves and responses of each telescope, the family of curves over load, or both."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
-    seed = parser.parse_args().seed
+    parts = {"telescopes": _write_telescopes, "families": _write_families}
+    parser.add_argument("--only", choices=parts, default=None)
+    asked = parser.parse_args()
+    for name, write in parts.items():
+        if asked.only in (None, name):
+            write(asked.seed)
+
+
+def _write_telescopes(seed: int) -> None:
+    """Write a curve and two pairs of responses for each telescope."""
     for k, make in enumerate(TELESCOPES):
         telescope, first = make(), 100 * seed + 10 * k
         folder = ROOT / "data" / "lto" / telescope.name
@@ -187,6 +216,14 @@ def main() -> None:
         for j, name in enumerate(("start", "stop", "start_again", "stop_again")):
             kind = name.partition("_")[0]
             write_recording(response(telescope, kind, first + 2 + j, name), folder / f"{name}.h5")
+
+
+def _write_families(seed: int) -> None:
+    """Write a curve for each load."""
+    folder = ROOT / "data" / "lto" / "families"
+    folder.mkdir(parents=True, exist_ok=True)
+    for k, load in enumerate(LOADS):
+        write_static_points(curve(family(load), 100 * seed + 50 + k, load), folder / f"{load}.h5")
 
 
 if __name__ == "__main__":

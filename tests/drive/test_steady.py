@@ -11,6 +11,7 @@ from friction_ocp.drive.parts import Drive, ExternalTorque, Gravity, Shaft, Tran
 from friction_ocp.drive.steady import Effort, steady_drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement, LoadDependence
+from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.static import CoulombViscous
 
 SETTLED = 1e-6
@@ -60,9 +61,9 @@ def test_the_plant_turns_steadily_under_the_predicted_current(name: str, current
     assert effort(drive_of(plant, inputs), "current", speed[-1]) == pytest.approx(current, rel=1e-5)
 
 
-def effort(drive: Drive, kind: Effort, speed: float, angle: float = 0.0) -> float:
+def effort(drive: Drive, kind: Effort, speed: float, angle: float = 0.0, placed: bool = False) -> float:
     """Return what the motors of a drive with plain numbers deliver at constant speed."""
-    steady = steady_drive(drive, kind)
+    steady = steady_drive(drive, kind, placed)
     values = {leaf.path: float(leaf.value) for leaf in drive_leaves(drive)}
     return float(steady.effort(speed, angle, np.array([values[path] for path in steady.parameter_names])))
 
@@ -83,3 +84,13 @@ def test_gravity_and_outer_torques_count_at_their_angle() -> None:
     drive = Drive((Shaft("a", 0.001), load), (Transmission("a", "b", 5.0),))
     wanted = (2.0 * np.sin(1.5 / 5.0 + 0.1) + 0.5) / 5.0
     assert effort(drive, "torque", 30.0, 1.5) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_the_wave_of_a_friction_counts_only_at_a_place() -> None:
+    """Dry friction of the load times 1 + a wave over its angle, where the angle is stated; without it the mean."""
+    friction = FrictionElement(CoulombViscous(0.2, 0.1), ripple=Ripple(0.3, -0.1, 0.7))
+    drive = Drive((Shaft("a", 0.001), Shaft("b", 0.02, friction)), (Transmission("a", "b", 5.0),))
+    turn = 2.0 * np.pi * (1.5 / 5.0) / 0.7
+    wave = 1.0 + 0.3 * np.cos(turn) - 0.1 * np.sin(turn)
+    assert effort(drive, "torque", 30.0, 1.5, placed=True) == pytest.approx((0.2 * wave + 0.6) / 5.0, rel=1e-12)
+    assert effort(drive, "torque", 30.0, 1.5) == pytest.approx((0.2 + 0.6) / 5.0, rel=1e-12)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from plant import Plant, PlantFriction, PlantSensor, PlantShaft, PlantTransmission, Trajectory
 
-from friction_ocp import identify
+from friction_ocp import check, identify
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.friction.element import FrictionElement
-from friction_ocp.friction.static import CoulombViscous, Polyline
+from friction_ocp.friction.static import CoulombViscous, Polyline, Stribeck
 from friction_ocp.parameters import Directional, Free
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import Recording
@@ -118,6 +119,22 @@ def stop_of_the_load() -> Recording:
         "load_speed": RecordedChannel("load_speed", time, speed, "rad/s"),
     }
     return Recording("stop", channels)
+
+
+def test_points_alone_that_leave_a_doubt_are_checked(points: StaticPoints) -> None:
+    """Dry friction on both sides of a gear is one sum at constant speed: a warning, and no further channel to name."""
+    drive = drive_with(
+        Polyline(Free(0.1, 0.0, 1.0), (0.004, 0.0005), (40.0,)), CoulombViscous(Free(2.0, 0.0, 9.0), 0.4)
+    )
+    (finding,) = check(problem_of(drive, points))
+    assert finding.severity == "warning" and "tau_c" in finding.what and "no further channel" in finding.remedy
+
+
+def test_a_simpler_model_with_nothing_to_fit_is_none(points: StaticPoints) -> None:
+    """Without its Stribeck part this friction has no parameter left: there is nothing to be fitted first."""
+    law = Stribeck(tau_c=0.11, tau_s=Free(0.15, 0.0, 1.0), omega_s=3.0)
+    model = prepare(problem_of(drive_with(law, CoulombViscous(2.0, 0.4)), points))
+    assert nested_space(model.problem, model.space) is model.space
 
 
 def test_points_and_a_recording_tell_together_what_neither_tells_alone(points: StaticPoints) -> None:

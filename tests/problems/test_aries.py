@@ -5,13 +5,14 @@ from __future__ import annotations
 import aries
 import numpy as np
 import pytest
-from lto_cases import REPOSITORY
+from lto_cases import REPOSITORY, script
 
 from friction_ocp import check, identify, load_problem, simulate
 from friction_ocp.recording.hdf5 import read_recording, read_static_points
 
 ARIES = REPOSITORY / "problems" / "aries"
 RECORDED = REPOSITORY / "data" / "aries"
+DATA = script("aries", "make_data")
 INTERVALS = 4.0
 SIDES = {"east_west": 0, "west_east": 1}
 
@@ -118,6 +119,27 @@ def test_a_coarse_log_does_not_tell_the_bristle() -> None:
     estimate = identify(load_problem(ARIES / "coarse_log.yaml"))
     assert [item.verdict.word for item in estimate.parameters] == ["not_identifiable", "not_identifiable"]
     assert sum("log faster" in text for text in estimate.warnings) == 2
+
+
+def test_the_wave_of_the_friction_over_position_is_found() -> None:
+    """Held speeds at 41 places: the wave over a turn of the roller to 2 % of its size, Coulomb friction of Table 1."""
+    estimate = identify(load_problem(ARIES / "places.yaml"))
+    values = estimate.values
+    for name, wanted in zip(("cosine", "sine"), DATA.WAVE, strict=True):
+        assert values[f"axis.friction.ripple.{name}"] == pytest.approx(wanted, rel=0.02)
+    for side, direction in enumerate(("positive", "negative")):
+        assert values[f"axis.friction.tau_c.{direction}"] == pytest.approx(aries.NUMBERS["tau_c"][side], rel=5e-3)
+
+
+def test_breakaway_grows_with_the_dwell() -> None:
+    """By 5 % of T_S in a decade of rest; a ramp of 10 N m/s breaks away below T_S, by less than 3 %."""
+    values = identify(load_problem(ARIES / "dwell.yaml")).values
+    for side, direction in enumerate(("positive", "negative")):
+        found = np.array([values[f"axis.friction.tau_s.{direction}@dwell_{rest:g}"] for rest in DATA.RESTS])
+        plain = found[DATA.RESTS.index(DATA.LONG_REST)]
+        assert 0.97 < plain / aries.NUMBERS["tau_s"][side] < 1.0
+        growth = np.polyfit(np.log10(DATA.RESTS), found / plain, 1)[0]
+        assert growth == pytest.approx(DATA.AGEING, abs=2e-3)
 
 
 def test_breakaway_falls_with_the_rate_of_the_ramp() -> None:

@@ -154,6 +154,16 @@ def test_draws_are_told_apart() -> None:
             assert min(ends, key=lambda name: ends[name]) == own[telescope.name], ends
 
 
+def test_a_family_of_curves_tells_how_friction_grows_with_the_load() -> None:
+    """Fig. 18: shares of the transmitted torque in dry and viscous friction of the fast part, three loads together."""
+    estimate = fitted("families")
+    assert_close(estimate, DATA.family("heavy").truth, {"motor.friction.load.coulomb": 0.05})
+    assert all(fit.noise_ratio < 1.6 for fit in estimate.simulation.static)
+    assert [use.set.get("load.external_torque.constant", 0.0) for use in estimate.problem.static] == [
+        -0.5 * pull for pull in DATA.LOADS.values()
+    ]
+
+
 def test_the_data_are_those_of_the_script() -> None:
     """The stop in the folder is what the script makes from its seed."""
     made = DATA.response(DATA.high_speed_polyline(), "stop", 103, "stop")
