@@ -27,6 +27,7 @@ from friction_ocp.estimation.estimate import Estimate, Simulation, identify, sim
 from friction_ocp.estimation.score import FreeRun
 from friction_ocp.estimation.static_points import StaticFit
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.static_points import StaticPoints
 from friction_ocp.report.sentence import verdict_sentence
 from friction_ocp.result_document import estimate_document
 
@@ -37,6 +38,8 @@ OPENING = """# Problems
 Each file asks one question and says what is known. `python problems/gallery.py` makes this page: it identifies every
 problem, or simulates it where every number is known, and draws the measurement (grey) beside the simulation (blue).
 """
+Line = tuple[str, np.ndarray, np.ndarray, np.ndarray]
+"""Name, abscissa, measured and predicted values."""
 SAMPLES = 4000
 """Points of a curve in a picture."""
 
@@ -113,13 +116,15 @@ def _plain(value: float, digits: int = 5) -> str:
 
 def draw(simulation: Simulation, answered: Estimate | Simulation, path: Path) -> None:
     """Draw static points, the first training recording, and the friction."""
-    runs, points = simulation.train[:1], [fit for fit in simulation.static if fit.split == "train"][:1]
+    fits = [fit for fit in simulation.static if fit.split == "train"]
+    points = list(zip(fits, (use.points for use in simulation.problem.static), strict=True))
+    runs = simulation.train[:1]
     curves = answered.curves if isinstance(answered, Estimate) and not points else ()
-    panels = len(runs) + len(points) + bool(curves)
+    panels = len(runs) + bool(points) + bool(curves)
     figure, axes = plt.subplots(1, panels, figsize=(4.2 * panels + 1.0, 3.0), squeeze=False)
     free = iter(axes[0])
-    for fit in points:
-        _draw_points(next(free), fit)
+    if points:
+        _draw_points(next(free), points)
     for run in runs:
         _draw_run(next(free), run, simulation.units)
     if curves:
@@ -136,12 +141,44 @@ def draw(simulation: Simulation, answered: Estimate | Simulation, path: Path) ->
     plt.close(figure)
 
 
-def _draw_points(panel: Axes, fit: StaticFit) -> None:
-    order = np.argsort(fit.speed)
-    panel.plot(fit.speed[order], fit.measured[order], "o", color="tab:gray", ms=4, label="measured")
-    panel.plot(fit.speed[order], fit.predicted[order], color="tab:blue", label="model")
-    panel.set(xlabel="speed, rad/s", ylabel=f"{fit.effort}, {fit.unit}", title="at constant speed")
-    panel.legend()
+def _draw_points(panel: Axes, sets: Sequence[tuple[StaticFit, StaticPoints]]) -> None:
+    """Draw static points over speed, over position where they have places, over their set where nothing moves."""
+    first, points = sets[0]
+    if not np.any(first.speed):
+        where, lines = "", _lines_over_sets(sets)
+        panel.set_xticks(range(len(sets)), [fit.name for fit, _ in sets])
+    elif points.position is None:
+        where, lines = "speed, rad/s", [(fit.name, fit.speed, fit.measured, fit.predicted) for fit, _ in sets]
+    else:
+        where, lines = "position, rad", _lines_over_position(first, points.position)
+    for number, (name, at, measured, predicted) in enumerate(lines):
+        order = np.argsort(at)
+        panel.plot(at[order], measured[order], "o", color="tab:gray", ms=4, label="" if number else "measured")
+        label = "model" if len(lines) == 1 else f"model, {name}"
+        panel.plot(at[order], predicted[order], color=f"C{number}", label=label)
+    panel.set(xlabel=where, ylabel=f"{first.effort}, {first.unit}", title="at constant speed" if where else "breakaway")
+    panel.legend(fontsize=7)
+
+
+def _lines_over_sets(sets: Sequence[tuple[StaticFit, StaticPoints]]) -> list[Line]:
+    """Return measured and predicted breakaway of each direction, set by set."""
+    lines: list[Line] = []
+    for name, sign in (("positive", 1.0), ("negative", -1.0)):
+        own = [np.sign(fit.measured) == sign for fit, _ in sets]
+        at = np.concatenate([np.full(int(mask.sum()), float(k)) for k, mask in enumerate(own)])
+        pairs = list(zip((fit for fit, _ in sets), own, strict=True))
+        measured = np.concatenate([fit.measured[mask] for fit, mask in pairs])
+        lines.append((name, at, measured, np.concatenate([fit.predicted[mask] for fit, mask in pairs])))
+    return lines
+
+
+def _lines_over_position(fit: StaticFit, position: np.ndarray) -> list[Line]:
+    """Return measured and predicted effort over position, speed by speed."""
+    lines: list[Line] = []
+    for speed in np.unique(fit.speed):
+        own = fit.speed == speed
+        lines.append((f"{speed:g} rad/s", position[own], fit.measured[own], fit.predicted[own]))
+    return lines
 
 
 def _draw_run(panel: Axes, run: FreeRun, units: Mapping[str, str]) -> None:
