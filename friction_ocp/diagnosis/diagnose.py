@@ -99,10 +99,12 @@ class Diagnosis:
     def carries_over(self) -> bool:
         """Whether what was added shrinks the gap on recordings that took no part, or leaves nothing of it there.
 
-        They take no part in choosing; but what helps where it was fitted alone explains nothing.
+        They take no part in choosing; but what helps where it was fitted alone explains nothing. Where the innovations
+        showed no gap, and only a stated value was wrong, there is none to shrink.
         """
         doubt = (1.0 + FLOOR_DOUBT) ** 2 - 1.0
-        return not self.accepted or self.after.excess() <= doubt or self.closed.interval95[0] > 0.0
+        shown = bool(self.accepted) and self.rounds[0].excess.significant(self.level)
+        return not shown or self.after.excess() <= doubt or self.closed.interval95[0] > 0.0
 
     @property
     def unexplained(self) -> bool:
