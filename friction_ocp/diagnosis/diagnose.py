@@ -286,7 +286,7 @@ def _rivals(crew: Crew, chosen: Sequence[Screened]) -> list[Rival]:
         return []
     without, refits = crew.without(chosen)
     current = crew.bench.current
-    hopes = [min(fitted.objective, current.objective - item.gain) for item, fitted in zip(chosen, refits, strict=True)]
+    hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in zip(chosen, refits, strict=True)]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
     worst = sorted(hopes)[:count][-1]
     pairs = zip(chosen, refits, strict=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
+from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.drive.parts import Drive
@@ -71,6 +73,13 @@ class FittedModel:
     def objective(self) -> float:
         """The cost of all residuals: half their sum of squares, or what the loss makes of them."""
         return self.linear.program.objective(self.linear.point)
+
+    @cached_property
+    def cost(self) -> float:
+        """The same with the noise that this model's own inertia would show: what models are compared by."""
+        program, wider = with_own_noise(self.linear.program, self.model, self.footing, self.theta)
+        point = solve_nodes(program, self.linear.point, STEPS_FROM_HELD_OUT)
+        return program.objective(point) + float(sum(np.sum(part) for part in wider))
 
 
 def fit_base(model: Model) -> FittedModel:
@@ -230,9 +239,10 @@ def held_out(fitted: FittedModel) -> FloatArray:
         theta = _without(fitted, group)
         for k in group:
             item = fitted.linear.recordings[k]
-            alone = _only(program, k)
+            alone, (wider,) = with_own_noise(_only(program, k), fitted.model, fitted.footing, theta)
             nodes = item.nodes + item.moved_by(theta - fitted.theta)
-            costs[k] = raw_costs(alone, solve_nodes(alone, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT))
+            point = solve_nodes(alone, Point(theta, (nodes,)), STEPS_FROM_HELD_OUT)
+            costs[k] = raw_costs(alone, point, wider)
     found = [costs[k] for k in range(len(program.experiments))]
     found += [_held_out_points(fitted, k) for k in range(len(program.static))]
     return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
@@ -322,15 +332,19 @@ def _some(program: Program, indices: Sequence[int]) -> Program:
     )
 
 
-def raw_costs(program: Program, point: Point) -> FloatArray:
-    """Return (rows,) half the squares of all residuals of a program of one recording, in the order of `Rows`."""
+def raw_costs(program: Program, point: Point, wider: FloatArray) -> FloatArray:
+    """Return (rows,) half the squares of all residuals of a program of one recording, in the order of `Rows`.
+
+    `wider` (gaps,) is what the width of a gap costs beside its residuals.
+    """
     result = program.simulate(0, point)
     item, cut, nodes = program.experiments[0], program.segments[0], point.nodes[0]
     errors = np.where(np.isfinite(item.measured), program.residuals(0, result.y), 0.0)
     parts: list[FloatArray] = []
     if cut.gap_weight is not None and cut.count > 1:
-        parts.append(np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:]).ravel())
+        gaps = np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:])
+        parts.append((0.5 * gaps**2 + wider[:, None] / nodes.shape[1]).ravel())
     if cut.start_weight is not None:
         suggested, _ = program.measured_states(item, point.theta, cut.first[cut.tied])
-        parts.append((cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel())
-    return np.concatenate([program.loss.cost(errors).ravel(), *(0.5 * part**2 for part in parts)])
+        parts.append(0.5 * (cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel() ** 2)
+    return np.concatenate([program.loss.cost(errors).ravel(), *parts])

@@ -40,6 +40,8 @@ NUMERICAL_INPUT = 1e-3
 """Error of a measured input over its rms, sample by sample, that a simulation between samples makes anyway."""
 SMOOTH = 4.0 * np.sqrt(6.0)
 """Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
+ALIKE = 0.01
+"""Relative difference of lengths of segments whose gaps are equally wide: the noise is not known better."""
 NEGLIGIBLE_GAP = 0.1
 """Gap over the noise floor that stands for a state that no noise enters."""
 
@@ -216,22 +218,35 @@ def unit_covariances(model: Model, foot: Footing, recording: str, spans: FloatAr
 
 
 def gap_roots(
-    model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
+    model: Model,
+    foot: Footing,
+    item: Experiment,
+    first: IntArray,
+    impulses: Mapping[str, FloatArray],
+    moving: Footing | None = None,
 ) -> FloatArray:
     """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
 
     Torque noise makes the states wander, more so where an input jumps between two samples; states that no noise
-    enters may jump by a share of the noise floor.
+    enters may jump by a share of the noise floor. `moving` holds the torque noise, and the inertias that it moves,
+    where these are not those of the footing.
     """
+    mover = foot if moving is None else moving
     spans = np.diff(item.grid.time[first])
     still = still_gaps(model, foot, item.name, float(np.median(spans)))
     if spans.size < 2:
         return np.zeros((0, still.size, still.size))
-    distinct, which = np.unique(np.round(spans, 9), return_inverse=True)
+    distinct, which = alike(spans)
     units = unit_covariances(model, foot, item.name, distinct)
-    power = group_density(model, foot, item.name)[:, None] ** 2 + _jump_power(model, foot, item, first, impulses)
+    power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
     covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
+
+
+def alike(spans: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the mean spans of groups that differ by ALIKE, and the group of each: covariances take time."""
+    _, which = np.unique(np.round(np.log(spans) / ALIKE), return_inverse=True)
+    return np.bincount(which, spans) / np.bincount(which), which.astype(np.int64)
 
 
 def _jump_power(

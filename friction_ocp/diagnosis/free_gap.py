@@ -34,6 +34,13 @@ class FreeErrors:
         drawn = np.ones(len(self.power)) if weight is None else weight
         return (drawn @ self.power) / np.maximum(drawn @ self.count, 1e-300)
 
+    @property
+    def lost(self) -> bool:
+        """Whether the simulation of some channel is farther from the recordings than their mean value is."""
+        measured = np.concatenate([run.measured for run in self.runs])
+        spread = np.nanvar(measured, axis=0) / self.floors**2
+        return bool(np.any(self.ratios() > np.maximum(spread, 1.0)))
+
     def excess(self, weight: FloatArray | None = None) -> float:
         """Return E, the mean over channels of max(0, rms^2 / floor^2 - 1)."""
         return float(np.mean(np.maximum(self.ratios(weight) - 1.0, 0.0)))

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.diagnosis.blocks import blocks_of
+from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.screen import Screened
@@ -64,7 +66,7 @@ def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
 
 def required(base: FittedModel, current: FittedModel) -> float:
     """Return the decrease of the objective that makes an addition an effect of its own."""
-    whole, rest = (max(item.objective - 0.5 * samples(item), 0.0) for item in (base, current))
+    whole, rest = (max(item.cost - 0.5 * samples(item), 0.0) for item in (base, current))
     return min(OF_ALL * whole, OF_REST * rest)
 
 
@@ -76,14 +78,24 @@ def samples(fitted: FittedModel) -> int:
 
 def gain(current: FittedModel, rival: Rival) -> float:
     """Return what a rival gains for certain: held out, but no more than where it was fitted."""
-    return min(float(np.sum(rival.gains)), current.objective - rival.fitted.objective)
+    return min(float(np.sum(rival.gains)), current.cost - rival.fitted.cost)
 
 
 def is_material(current: FittedModel, fitted: FittedModel) -> bool:
-    """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points."""
+    """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
+
+    Free runs that are lost cannot show it: there the innovations may, as long as the runs get no worse.
+    """
     before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
     pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
+    if before.lost and after.excess() <= before.excess():
+        pairs.append((_innovation_excess(current), _innovation_excess(fitted)))
     return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
+
+
+def _innovation_excess(fitted: FittedModel) -> float:
+    rows = fitted.linear.rows
+    return max(0.0, excess(rows, blocks_of(rows)).ratio - 1.0)
 
 
 def _static_excess(fitted: FittedModel) -> float:

@@ -13,6 +13,7 @@ from diagnosis_cases import VISCOUS, axis, write_case
 from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out
+from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
@@ -46,7 +47,25 @@ def test_innovations_of_a_right_model_are_noise(fitted: FittedModel) -> None:
 def test_held_out_costs_exceed_those_of_the_fit(fitted: FittedModel) -> None:
     """A recording that took no part in a fit costs a little more than one that did, and of the same order."""
     costs = float(np.sum(held_out(fitted)))
-    assert fitted.objective <= costs * (1.0 + 1e-6) < 1.2 * fitted.objective
+    assert fitted.cost <= costs * (1.0 + 1e-6) < 1.2 * fitted.cost
+
+
+def test_a_heavier_rotor_is_moved_less_by_the_same_torque_noise(fitted: FittedModel) -> None:
+    """Gaps of twice the inertia are narrower, by 2 at most where torque noise enters, and that is credited."""
+    program, names = fitted.linear.program, fitted.model.space.names
+    theta = np.array([fitted.footing.numbers["a"][name] for name in names])
+    same, nothing = with_own_noise(program, fitted.model, fitted.footing, theta)
+    heavy, prices = with_own_noise(
+        program, fitted.model, fitted.footing, theta * np.where(np.array(names) == "motor.inertia", 2.0, 1.0)
+    )
+    for before, one, two in zip(program.segments, same.segments, heavy.segments, strict=True):
+        assert before.gap_weight is not None and one.gap_weight is not None and two.gap_weight is not None
+        assert np.allclose(one.gap_weight, before.gap_weight, rtol=1e-9)
+        widths = [np.sqrt(np.linalg.inv(w.swapaxes(1, 2) @ w)[:, 1, 1]) for w in (before.gap_weight, two.gap_weight)]
+        ratio = widths[0] / widths[1]
+        assert np.all((ratio > 1.2) & (ratio <= 2.0))
+    assert all(np.allclose(price, 0.0, atol=1e-9) for price in nothing)
+    assert all(np.all((-2.0 * np.log(2.0) <= price) & (price < -np.log(1.2))) for price in prices)
 
 
 def test_recordings_are_held_out_of_fits_at_bounds(tmp_path: Path) -> None:

@@ -357,6 +357,19 @@ def test_a_fitted_zero_can_be_scored(name: str, omega: float) -> None:
         assert slope[:, k] == pytest.approx(quotient, rel=curvature, abs=curvature * np.abs(quotient).max())
 
 
+def test_a_bristle_starts_in_balance_with_a_motor_that_lags() -> None:
+    """At rest the deflection carries the torque of the motor, whose lag is taken to be over."""
+    law = LuGre(tau_c=1.0, tau_s=1.0, omega_s=0.1, sigma0=100.0, sigma1=0.0, sigma2=0.0)
+    shaft = Shaft("axis", J, FrictionElement(law))
+    channels = (Channel("torque", "servo.torque", "input"), Channel("angle", "axis.theta"))
+    parts = Drive((shaft,), motors=(Motor("servo", "axis", lag=LAG),), channels=channels)
+    drive, values = stepped(parts), {leaf.path: leaf.value for leaf in drive_leaves(parts)}
+    numbers = [values[name] for name in drive.parameter_names]
+    state = dict(zip(drive.state_names, np.asarray(drive.start(0.0, 0.0, 0.0, 0.3, numbers)).ravel(), strict=True))
+    assert state["servo.lagged"] == pytest.approx(0.3)
+    assert state["axis.friction.z"] == pytest.approx(0.3 / 100.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("lag", [0.0, 1e-6, 1e-4, 1e-3, 1e-2])
 def test_a_lag_of_any_size_delays_a_ramp_by_itself(lag: float) -> None:
     """Behind a ramp of the command the current is late by the lag, for lags far below the step and far above it."""

@@ -1,0 +1,50 @@
+"""The likelihood of recordings under a model whose own inertia the torque noise moves.
+
+Fits share the weights of their gaps, so that a least-squares program compares them. But torque noise moves a heavy
+rotor less than a light one: judged by motion alone, a rotor that is too heavy, or an angle that is shown too large,
+would pay less for every torque that the model lacks. Whoever compares models asks what noise would have done in each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.diagnosis.footing import Footing, gap_roots, input_impulses, torque_noise
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.program import Program, Segments
+from friction_ocp.simulation.grid import FloatArray
+
+
+def moved_by_own(foot: Footing, model: Model, theta: FloatArray) -> Footing:
+    """Return a footing with the torque noise and the numbers of a model at its parameters."""
+    names = model.space.leaf_names
+    numbers = {key: dict(zip(names, map(float, model.space.numbers(theta, key)), strict=True)) for key in foot.numbers}
+    return replace(foot, density=torque_noise(model, next(iter(numbers.values()))), numbers=numbers)
+
+
+def with_own_noise(
+    program: Program, model: Model, foot: Footing, theta: FloatArray
+) -> tuple[Program, tuple[FloatArray, ...]]:
+    """Return a program with gaps as wide as torque noise makes them at `theta`, and what that costs by itself.
+
+    By recording (gaps,) the logarithm of how much wider they may be: half the change of the log-determinant of their
+    covariance.
+    """
+    moving = moved_by_own(foot, model, theta)
+    pairs = zip(program.experiments, program.segments, strict=True)
+    found = [_reweighed(model, foot, moving, item, cut) for item, cut in pairs]
+    return replace(program, segments=tuple(cut for cut, _ in found)), tuple(price for _, price in found)
+
+
+def _reweighed(
+    model: Model, foot: Footing, moving: Footing, item: Experiment, cut: Segments
+) -> tuple[Segments, FloatArray]:
+    if cut.gap_weight is None or cut.count < 2:
+        return cut, np.zeros(0)
+    impulses = input_impulses(model, item, moving.numbers[item.name])
+    roots = gap_roots(model, foot, item, cut.first, impulses, moving)
+    wider = np.linalg.slogdet(cut.gap_weight)[1] - np.linalg.slogdet(roots)[1]
+    return replace(cut, gap_weight=roots), np.asarray(wider, dtype=np.float64)
