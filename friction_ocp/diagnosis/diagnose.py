@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
@@ -119,10 +119,14 @@ class Diagnosis:
 
     @property
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
-        """Sets of candidates that the recordings cannot tell apart."""
+        """Sets of candidates that the recordings cannot tell apart, the accepted one first.
+
+        What was accepted in another round is there besides, not instead.
+        """
         decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
-        sets = [tuple(rival.key for rival in shown(item.choice.aliases)) for item in decided]
-        return tuple(keys for keys in sets if len(keys) > 1)
+        sets = [[rival.key for rival in shown(item.choice.aliases)] for item in decided]
+        left = [(keys[0], *(key for key in keys[1:] if key not in self.accepted)) for keys in sets if keys]
+        return tuple(keys for keys in left if len(keys) > 1)
 
     @property
     def same(self) -> tuple[tuple[Key, ...], ...]:
@@ -227,13 +231,17 @@ def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Roun
 def _reexamined(
     base: FittedModel, current: FittedModel, accepted: list[Key], level: float, rng: np.random.Generator
 ) -> tuple[FittedModel, list[Key]]:
-    """Drop earlier additions that the latest one has made superfluous on recordings left out."""
+    """Drop earlier additions that the latest one has made superfluous on recordings left out.
+
+    Superfluous is what neither gains for certain there nor is worth an addition in sum.
+    """
     for key in accepted[:-1]:
         kept = [other for other in accepted if other != key]
         simpler = without_addition(current, with_additions(base, kept))
         blocks = blocks_of(current.linear.rows)
         gains = blocks_like(current, simpler, blocks) - blocks.sums(held_out(current))
-        if np.quantile(resamples(blocks, rng) @ gains, level) <= 0:
+        certain = np.quantile(resamples(blocks, rng) @ gains, level) > 0
+        if not certain and float(np.sum(gains)) < required(base, simpler):
             current, accepted = simpler, kept
     return current, accepted
 
@@ -273,22 +281,31 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     power = excess(current.linear.rows, blocks)
     hopeful, gap = [item for item in found if item.gain >= HOPE * enough], power.significant(level)
     chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-    rivals = _rivals(crew, chosen)
-    able = [gain(current, item) >= enough and is_material(current, item.fitted) for item in rivals]
-    choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
+    choice = Choice((), (), 1.0, False, ())
+    for rivals in _completed(crew, chosen):
+        able = [gain(current, item) >= enough and is_material(current, item.fitted) for item in rivals]
+        choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
+        choice = with_refused(choice, tuple(item for item, yes in zip(rivals, able, strict=True) if not yes))
+        if choice.significant or not gap:
+            break
     best = choice.rivals[0] if choice.significant else None
-    refused = tuple(item for item, yes in zip(rivals, able, strict=True) if not yes)
-    return Round(tuple(found), with_refused(choice, refused), current, power, best)
+    return Round(tuple(found), choice, current, power, best)
 
 
-def _rivals(crew: Crew, chosen: Sequence[Screened]) -> list[Rival]:
+def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
+    """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
+
+    What fits best where it was fitted may be worth nothing on recordings left out.
+    """
     if not chosen:
-        return []
+        return
     without, refits = crew.without(chosen)
     current = crew.bench.current
     hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in zip(chosen, refits, strict=True)]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
-    worst = sorted(hopes)[:count][-1]
-    pairs = zip(chosen, refits, strict=True)
-    kept = [pair for pair, hope in zip(pairs, hopes, strict=True) if hope <= worst]
-    return crew.rivals(kept, without)
+    order = np.argsort(hopes, kind="stable")
+    pairs = [(chosen[k], refits[k]) for k in order]
+    rivals = crew.rivals(pairs[:count], without)
+    yield rivals
+    if len(pairs) > count:
+        yield [*rivals, *crew.rivals(pairs[count:], without)]

@@ -57,7 +57,7 @@ def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> Fo
         return None
     wanted = set(diagnosis.alias_sets[0])
     done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
-    rivals = shown(done.choice.aliases)
+    rivals = [rival for rival in shown(done.choice.aliases) if rival.key in wanted]
     keys = tuple(rival.key for rival in rivals)
     design = separating(done.before, [rival.fitted for rival in rivals], tell)
     found = FollowUp(keys, "", design)
