@@ -303,7 +303,7 @@ def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
     current = crew.bench.current
     hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in zip(chosen, refits, strict=True)]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
-    order = np.argsort(hopes, kind="stable")
+    order = sorted(range(len(hopes)), key=lambda k: hopes[k])
     pairs = [(chosen[k], refits[k]) for k in order]
     rivals = crew.rivals(pairs[:count], without)
     yield rivals
