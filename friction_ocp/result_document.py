@@ -152,11 +152,10 @@ def _coherences(simulation: Simulation) -> dict[str, Any]:
     """Return by recording and channel how far the measurement depends linearly on the free run, over frequency."""
     told: dict[str, Any] = {}
     for run in (*simulation.train, *simulation.validation):
-        columns = {name: run.measured[:, k] for k, name in enumerate(simulation.units)}
         told[run.name] = {
-            name: _coherence(coherence(run.time, measured, run.simulated[:, k]))
-            for k, (name, measured) in enumerate(columns.items())
-            if np.isfinite(measured).sum() >= FEWEST_SAMPLES
+            name: _coherence(coherence(run.time, run.measured[:, k], run.simulated[:, k]))
+            for k, name in enumerate(simulation.units)
+            if np.isfinite(run.measured[:, k]).sum() >= FEWEST_SAMPLES
         }
     return told
 

@@ -32,9 +32,8 @@ def clues_of(fitted: FittedModel) -> Clues:
     """Return what the fitted model says about motions and torques."""
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
-    coarse = _smoothers(fitted, fitted.model.problem.estimation.segment)
-    if fitted.footing.segment_s is not None:
-        coarse = fitted.linear.recordings
+    free = fitted.footing.segment_s is None
+    coarse = _smoothers(fitted, fitted.model.problem.estimation.segment) if free else fitted.linear.recordings
     longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
     pairs = zip(coarse, _smoothers(fitted, max(FINE, longest // MOST_FINE)), strict=True)
     tracks = tuple(_track(fitted, index, watch, names, *pair) for index, pair in enumerate(pairs))

@@ -16,7 +16,7 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
-from friction_ocp.diagnosis.reading import explains_more, innovations, other_reading, with_additions
+from friction_ocp.diagnosis.reading import explains_more, other_reading, with_additions
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown, with_refused
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
@@ -24,6 +24,7 @@ from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.diagnosis.worth import (
     Key,
     gain,
+    innovations,
     is_material,
     places,
     required,
@@ -281,7 +282,7 @@ def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator,
     power = excess(current.linear.rows, blocks)
     hopeful, gap = [item for item in found if item.gain >= HOPE * enough], power.significant(level)
     chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-    choice = Choice((), (), 1.0, False, ())
+    choice = choose([], blocks, level, rng)
     for rivals in _completed(crew, chosen):
         able = [gain(current, item) >= enough and is_material(current, item.fitted) for item in rivals]
         choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)

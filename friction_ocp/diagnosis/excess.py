@@ -21,6 +21,11 @@ class Excess:
     p_value: float
     """Probability of so much power where there is nothing but noise, the floor being off by its doubt."""
 
+    @property
+    def beyond(self) -> float:
+        """Share of the power that noise does not explain, in units of the noise."""
+        return max(self.ratio - 1.0, 0.0)
+
     def significant(self, level: float) -> bool:
         """Whether there is more than noise at a level."""
         return self.p_value < level

@@ -198,11 +198,11 @@ def freed(fitted: FittedModel) -> FittedModel:
     if not fitted.theta.size:
         return fitted
     program, point = fitted.linear.program, fitted.linear.point
-    ends = [point, _around_kinks(fitted.model, program, point, WARM).point]
-    best = min(ends, key=program.objective)
+    beyond = _around_kinks(fitted.model, program, point, WARM)
+    best = beyond.point if beyond.objective < fitted.objective else point
     moved = unstuck(fitted.model, program, best)
     if moved is not best:
-        best = min((moved, solve_gauss_newton(program, moved, WARM).point), key=program.objective)
+        best = solve_gauss_newton(program, moved, WARM).point
     return fitted if best is point else replace(fitted, linear=linear_program(program, best))
 
 
@@ -338,13 +338,7 @@ def raw_costs(program: Program, point: Point, wider: FloatArray) -> FloatArray:
     `wider` (gaps,) is what the width of a gap costs beside its residuals.
     """
     result = program.simulate(0, point)
-    item, cut, nodes = program.experiments[0], program.segments[0], point.nodes[0]
-    errors = np.where(np.isfinite(item.measured), program.residuals(0, result.y), 0.0)
-    parts: list[FloatArray] = []
-    if cut.gap_weight is not None and cut.count > 1:
-        gaps = np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:])
-        parts.append((0.5 * gaps**2 + wider[:, None] / nodes.shape[1]).ravel())
-    if cut.start_weight is not None:
-        suggested, _ = program.measured_states(item, point.theta, cut.first[cut.tied])
-        parts.append(0.5 * (cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)).ravel() ** 2)
-    return np.concatenate([program.loss.cost(errors).ravel(), *parts])
+    samples = program.loss.cost(program.sample_errors(0, result.y))
+    gaps, starts = program.gap_errors(0, point, result.end), program.start_errors(0, point)
+    widths = wider[:, None] / gaps.shape[1]
+    return np.concatenate([samples.ravel(), (0.5 * gaps**2 + widths).ravel(), 0.5 * starts.ravel() ** 2])

@@ -66,13 +66,13 @@ class LinearRecording:
         self.seen = np.isfinite(self.item.measured)
         time = np.arange(self.item.grid.time.size)
         self.segment = self.cut.owner(time)
-        errors = np.where(self.seen, (self.y - self.item.measured) / self.noise, 0.0)
+        errors = program.sample_errors(index, self.y)
         self.scaling = np.sqrt(self.loss.weight(errors)) / self.noise
         self.dy = result.dy[:, :, : self.states] * self.scaling[:, :, None]
         self.dend = result.dend[:, :, : self.states]
         _, self.slope = program.space.numbers_and_slope(point.theta, self.item.name)
         self._factor()
-        gaps, starts = self._gaps(self.end[:-1] - self.nodes[1:]), self._start_errors(program, point)
+        gaps, starts = program.gap_errors(index, point, self.end), program.start_errors(index, point)
         self.raw = self._stack(errors * self.scaling * self.noise, gaps, starts)
         by_theta = result.dy[:, :, self.states :] @ self.slope * self.scaling[:, :, None]
         end_theta = result.dend[:-1, :, self.states :] @ self.slope
@@ -80,18 +80,6 @@ class LinearRecording:
         self.direct = columns + self._measured_slopes(program, point)
         self.jacobian = self.reduced(self.direct)
         self.residual = self.reduced(self.raw[:, None])[:, 0]
-
-    def _gaps(self, gap: FloatArray) -> FloatArray:
-        if self.cut.gap_weight is None or self.cut.count < 2:
-            return np.zeros((0, self.states))
-        return np.einsum("kij,kj->ki", self.cut.gap_weight, gap)
-
-    def _start_errors(self, program: Program, point: Point) -> FloatArray:
-        if self.cut.start_weight is None:
-            return np.zeros((0, self.states))
-        tied = self.cut.tied
-        suggested, _ = program.measured_states(self.item, point.theta, self.cut.first[tied])
-        return self.cut.start_weight[tied] * (self.nodes[tied] - suggested)
 
     def _start_slopes(self, program: Program, point: Point) -> FloatArray:
         if self.cut.start_weight is None:

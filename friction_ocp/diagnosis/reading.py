@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel, polished
-from friction_ocp.diagnosis.worth import OF_REST, Key, prescribed
+from friction_ocp.diagnosis.worth import OF_REST, Key, innovations, prescribed
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
@@ -47,11 +46,11 @@ def corrections(stated: Problem, read: Problem) -> list[str]:
 
 def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool) -> bool:
     """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest."""
-    ratio = innovations(final).ratio
+    left = innovations(final)
     fewer = [[other for other in accepted if other != key] for key in accepted]
-    if any(_ratio_with(base, keys, final) <= ratio * (1.0 + FLOOR_DOUBT) ** 2 for keys in fewer):
+    if any(_ratio_with(base, keys, final) <= left.ratio * (1.0 + FLOOR_DOUBT) ** 2 for keys in fewer):
         return True
-    return left_over and _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * max(ratio - 1.0, 0.0)
+    return left_over and _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond
 
 
 def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
@@ -74,9 +73,3 @@ def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
         if place in {*effects()[effect].places(drive), *prescribed(drive)}:
             drive = effects()[effect].augment(drive, place, clues).drive
     return drive
-
-
-def innovations(fitted: FittedModel) -> Excess:
-    """Return the power of the innovations over the noise."""
-    rows = fitted.linear.rows
-    return excess(rows, blocks_of(rows))

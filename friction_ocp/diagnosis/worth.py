@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
-from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.excess import Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.screen import Screened
@@ -89,13 +89,14 @@ def is_material(current: FittedModel, fitted: FittedModel) -> bool:
     before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
     pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
     if before.lost and after.excess() <= before.excess():
-        pairs.append((_innovation_excess(current), _innovation_excess(fitted)))
+        pairs.append((innovations(current).beyond, innovations(fitted).beyond))
     return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
 
 
-def _innovation_excess(fitted: FittedModel) -> float:
+def innovations(fitted: FittedModel) -> Excess:
+    """Return the power of the innovations over the noise."""
     rows = fitted.linear.rows
-    return max(0.0, excess(rows, blocks_of(rows)).ratio - 1.0)
+    return excess(rows, blocks_of(rows))
 
 
 def _static_excess(fitted: FittedModel) -> float:

@@ -42,11 +42,8 @@ class Coherence:
             return self
         bins = np.unique(np.round(np.geomspace(1, self.frequency.size, points)).astype(np.int64) - 1)
         power = np.add.reduceat(self.power, bins)
-        weight = np.maximum(power, np.finfo(np.float64).tiny)
-        frequency, share = (
-            np.add.reduceat(values * np.maximum(self.power, np.finfo(np.float64).tiny), bins) / weight
-            for values in (self.frequency, self.share)
-        )
+        own, weight = (np.maximum(values, np.finfo(np.float64).tiny) for values in (self.power, power))
+        frequency, share = (np.add.reduceat(values * own, bins) / weight for values in (self.frequency, self.share))
         return Coherence(frequency, share, power)
 
 

@@ -78,11 +78,10 @@ def _of_recording(
     loss = program.loss
     parts = [(rows, residual, loss.weight(residual) * residual, loss.curvature(residual), time)]
     if cut.gap_weight is not None and cut.count > 1:
-        gap = np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - point.nodes[index][1:])
+        flat = program.gap_errors(index, point, result.end).ravel()
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
         moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
-        flat: FloatArray = gap.ravel()
         parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
     order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")
     return tuple(np.concatenate(column)[order] for column in zip(*parts, strict=True))  # pyright: ignore[reportReturnType]

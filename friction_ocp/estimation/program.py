@@ -50,8 +50,15 @@ class Segments:
     @property
     def tied(self) -> IntArray:
         """Indices of the nodes that have a prior."""
-        assert self.start_weight is not None
+        if self.start_weight is None:
+            return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(np.any(self.start_weight > 0, axis=1))
+
+    def weighed(self, gaps: FloatArray) -> FloatArray:
+        """Return gaps (segments - 1, states) over what is allowed; none where the segments are unconnected."""
+        if self.gap_weight is None or self.count < 2:
+            return np.zeros((0, gaps.shape[1]))
+        return np.einsum("kij,kj->ki", self.gap_weight, gaps)
 
 
 @dataclass(frozen=True)
@@ -220,30 +227,32 @@ class Program:
         """Return (n, outputs) errors over the noise floor, NaN where there is no sample."""
         return (y - self.experiments[index].measured) / self.noise
 
+    def sample_errors(self, index: int, y: FloatArray) -> FloatArray:
+        """Return (n, outputs) errors over the noise floor, zero where there is no sample."""
+        return np.where(np.isfinite(self.experiments[index].measured), self.residuals(index, y), 0.0)
+
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
         total = _prior_cost(self.space, point.theta) + self._static_cost(point.theta)
         for index, (result, score) in enumerate(self._scored(point, self.measured_starts(point.theta))):
-            total += float(np.sum(score.cost)) + self._start_cost(index, point)
-            total += self._gap_cost(self.segments[index], point.nodes[index], result.end)
+            total += float(np.sum(score.cost)) + 0.5 * float(np.sum(self.start_errors(index, point) ** 2))
+            total += 0.5 * float(np.sum(self.gap_errors(index, point, result.end) ** 2))
         return total if np.isfinite(total) else np.inf
 
     def _static_cost(self, theta: FloatArray) -> float:
         return sum(term.cost(self.space, theta) for term in self.static)
 
-    def _gap_cost(self, cut: Segments, nodes: FloatArray, end: FloatArray) -> float:
-        if cut.gap_weight is None or cut.count < 2:
-            return 0.0
-        scaled = np.einsum("kij,kj->ki", cut.gap_weight, end[:-1] - nodes[1:])
-        return 0.5 * float(np.sum(scaled**2))
+    def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
+        """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
+        return self.segments[index].weighed(end[:-1] - point.nodes[index][1:])
 
-    def _start_cost(self, index: int, point: Point) -> float:
-        cut = self.segments[index]
+    def start_errors(self, index: int, point: Point) -> FloatArray:
+        """Return (tied, states) how far tied nodes are from what was measured, over their deviations."""
+        cut, nodes = self.segments[index], point.nodes[index]
         if cut.start_weight is None:
-            return 0.0
-        tied = cut.tied
-        suggested, _ = self.measured_states(self.experiments[index], point.theta, cut.first[tied])
-        return 0.5 * float(np.sum((cut.start_weight[tied] * (point.nodes[index][tied] - suggested)) ** 2))
+            return np.zeros((0, nodes.shape[1]))
+        suggested, _ = self.measured_states(self.experiments[index], point.theta, cut.first[cut.tied])
+        return cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)
 
     def parameter_terms(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return cost, Hessian and gradient of what hangs on the parameters alone: priors and static points."""
@@ -294,7 +303,7 @@ class Program:
         assert result.dend is not None
         weight, states = cut.gap_weight, nodes.shape[1]
         before, after = slice(0, cut.count - 1), slice(1, cut.count)
-        gap: FloatArray = np.einsum("kij,kj->ki", weight, result.end[:-1] - nodes[1:])
+        gap = cut.weighed(result.end[:-1] - nodes[1:])
         jacobian = weight @ result.dend[:-1]
         system.cost += 0.5 * float(np.sum(gap**2))
         system.add(before, jacobian, gap, np.ones(gap.shape), slope)

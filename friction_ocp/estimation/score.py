@@ -75,7 +75,7 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
     if program.without_nodes:
         return point
     still, system = np.zeros_like(point.theta), program.linearise(point)
-    objective, damping = program.objective(point), 1e-6
+    objective, damping = system.objective, 1e-6
     for _ in range(iterations):
         steps = reduce_system(system, damping).node_steps(still)
         trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))

@@ -36,27 +36,20 @@ def spliced(program: Program, point: Point, other: Point) -> Point:
 
 def _costs(program: Program, index: int, point: Point) -> tuple[FloatArray, FloatArray]:
     """Return (segments,) costs of the samples in each segment, and (segments + 1,) of the gap before each."""
-    item, cut, nodes = program.experiments[index], program.segments[index], point.nodes[index]
-    result = program.simulate(index, point)
-    errors = np.where(np.isfinite(item.measured), program.residuals(index, result.y), 0.0)
-    samples = np.add.reduceat(np.sum(program.loss.cost(errors), axis=1), cut.first[:-1])
+    cut, result = program.segments[index], program.simulate(index, point)
+    costs = program.loss.cost(program.sample_errors(index, result.y))
+    jumps, starts = program.gap_errors(index, point, result.end), program.start_errors(index, point)
     gaps = np.zeros(cut.count + 1)
-    if cut.gap_weight is not None and cut.count > 1:
-        jumps = np.einsum("kij,kj->ki", cut.gap_weight, result.end[:-1] - nodes[1:])
-        gaps[1:-1] = 0.5 * np.sum(jumps**2, axis=1)
-    if cut.start_weight is not None:
-        tied = cut.tied
-        suggested, _ = program.measured_states(item, point.theta, cut.first[tied])
-        gaps[tied] += 0.5 * np.sum((cut.start_weight[tied] * (nodes[tied] - suggested)) ** 2, axis=1)
-    return samples, gaps
+    gaps[1 : len(jumps) + 1] = 0.5 * np.sum(jumps**2, axis=1)
+    gaps[cut.tied] += 0.5 * np.sum(starts**2, axis=1)
+    return np.add.reduceat(np.sum(costs, axis=1), cut.first[:-1]), gaps
 
 
 def _differ(cut: Segments, nodes: FloatArray, others: FloatArray) -> BoolArray:
     """Return (segments,) whether two sets of nodes differ by more than a gap between segments may."""
     if cut.gap_weight is None or cut.count < 2:
         return np.any(nodes != others, axis=1)
-    apart = np.einsum("kij,kj->ki", cut.gap_weight, nodes[1:] - others[1:])
-    beyond = np.linalg.norm(apart, axis=1) > APART
+    beyond = np.linalg.norm(cut.weighed(nodes[1:] - others[1:]), axis=1) > APART
     return np.concatenate([beyond[:1], beyond])
 
 

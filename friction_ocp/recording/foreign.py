@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.optional_library import optional_library
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
@@ -57,6 +58,15 @@ class ForeignFile:
 
 Opener = Callable[[Path, ImportMap | None], AbstractContextManager[ForeignFile]]
 """Opens a file of one format; the map may say how it is written."""
+
+
+def in_memory(columns: Mapping[str, Values], summary: str) -> ForeignFile:
+    """Return a file without time axes that has been read whole; a name may state the unit."""
+    names = tuple(columns)
+    signals = tuple(
+        Signal(name, len(values), header_unit(name), numeric=is_real(values)) for name, values in columns.items()
+    )
+    return ForeignFile(signals, lambda wanted: {k: columns[names[k]] for k in wanted}, no_clock, summary)
 
 
 def no_clock(name: str) -> FloatArray:
@@ -130,6 +140,14 @@ def check_sizes(path: Path, signals: Sequence[Signal]) -> None:
     if needed > free:
         what = f"about {needed / 1e9:.3g} GB of memory are needed, {free / 1e9:.3g} GB are free"
         raise FrictionOcpError(Finding(where, what, remedy="import fewer channels, or " + remedy))
+
+
+def refuse_large(path: Path, size: int, what: str) -> None:
+    """Refuse a file that unpacks to `size` bytes where that does not fit, before anything is unpacked."""
+    limit = min(8 * MAX_SAMPLES * 8, free_memory() // 2)
+    if size > limit:
+        declared = f"its {what} declare {size} bytes"
+        raise FrictionOcpError(Finding(str(path), declared, f"at most {limit}", f"save fewer {what} in one file"))
 
 
 def free_memory() -> int:

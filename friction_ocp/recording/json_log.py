@@ -12,8 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, free_memory, no_clock, reading
-from friction_ocp.recording.header_unit import header_unit
+from friction_ocp.recording.foreign import ForeignFile, Values, free_memory, in_memory, reading
 from friction_ocp.recording.import_map import ImportMap
 
 KIND = "JSON"
@@ -31,16 +30,7 @@ def open_json(path: Path, import_map: ImportMap | None = None) -> Generator[Fore
     with reading(path, KIND):
         found = _Found()
         found.collect("", _content(path), 0)
-    names = tuple(found.series)
-    signals = tuple(
-        Signal(name, len(values), header_unit(name), numeric=values.dtype.kind in "biuf")
-        for name, values in found.series.items()
-    )
-
-    def read(wanted: Sequence[int]) -> Mapping[int, Values]:
-        return {k: found.series[names[k]] for k in wanted}
-
-    yield ForeignFile(signals, read, no_clock, found.summary)
+    yield in_memory(found.series, found.summary)
 
 
 def _refuse_too_large(path: Path) -> None:

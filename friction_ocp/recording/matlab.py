@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.foreign import MAX_SAMPLES, ForeignFile, Signal, Values, free_memory, no_clock, reading
+from friction_ocp.recording.foreign import ForeignFile, Values, in_memory, reading, refuse_large
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.matlab_hdf5 import is_hdf5, open_hdf5
 
@@ -31,26 +30,11 @@ def open_matlab(path: Path, import_map: ImportMap | None = None) -> Generator[Fo
 
     io: Any = _io
     with reading(path, KIND):
-        _refuse_too_large(path)
+        refuse_large(path, sum(_declared_sizes(path)), "variables")
         content: dict[str, Any] = io.loadmat(path, simplify_cells=True)
     variables = [(name, value) for name, value in content.items() if not name.startswith("__")]
     columns = dict(pair for name, value in variables for pair in _columns(name, value, 0))
-    names = tuple(columns)
-    signals = tuple(Signal(name, len(columns[name]), numeric=columns[name].dtype.kind in "biuf") for name in names)
-
-    def read(wanted: Sequence[int]) -> Mapping[int, Values]:
-        return {k: columns[names[k]] for k in wanted}
-
-    yield ForeignFile(signals, read, no_clock, "MATLAB up to version 7")
-
-
-def _refuse_too_large(path: Path) -> None:
-    """Refuse variables whose stated size does not fit, before any is unpacked."""
-    needed = sum(_declared_sizes(path))
-    limit = min(8 * MAX_SAMPLES * 8, free_memory() // 2)
-    if needed > limit:
-        what = f"its variables declare {needed} bytes"
-        raise FrictionOcpError(Finding(str(path), what, f"at most {limit}", "save fewer variables in one file"))
+    yield in_memory(columns, "MATLAB up to version 7")
 
 
 def _declared_sizes(path: Path) -> Iterator[int]:

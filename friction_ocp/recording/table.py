@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,28 @@ class _Wanted:
 def recording_of(file: ForeignFile, import_map: ImportMap, path: Path) -> Recording:
     """Turn the mapped signals into channels in SI units; raises FrictionOcpError with every finding."""
     wanted = _wanted(file, import_map)
+    values, origin = _read(file, wanted, path)
+    channels = _channels(file, import_map, wanted, values)
+    recording = Recording(channels=channels, **_provenance(import_map, path, _origin(file, origin)))
+    _raise(check_recording(recording, str(path)))
+    return recording
+
+
+def static_points_of(file: ForeignFile, import_map: ImportMap, path: Path) -> StaticPoints:
+    """Turn the mapped columns into static points in SI units; raises FrictionOcpError with every finding."""
+    found, _ = _read(file, _wanted(file, import_map), path)
+    columns = {place.removeprefix("points."): column for place, column in found.items()}
+    values = {name: column[0] for name, column in columns.items()}
+    units = {name: column[1] for name, column in columns.items()}
+    points = StaticPoints(units=units, **values, **_provenance(import_map, path))
+    _raise(check_static_points(points, str(path)))
+    return points
+
+
+def _read(
+    file: ForeignFile, wanted: Mapping[str, _Wanted], path: Path
+) -> tuple[dict[str, tuple[FloatArray, str]], int]:
+    """Return values in SI and their unit by place, and from where times are counted; raises all findings together."""
     check_sizes(path, [item.signal for item in wanted.values()])
     raw = file.read(sorted({item.index for item in wanted.values()}))
     origin = _far_origin([raw[item.index] for place, item in wanted.items() if _is_time(place)])
@@ -49,52 +72,21 @@ def recording_of(file: ForeignFile, import_map: ImportMap, path: Path) -> Record
         except FrictionOcpError as error:
             findings += error.findings
     _raise(findings)
-    channels = _channels(file, import_map, wanted, values)
-    sha256 = _fingerprint(path)
-    recording = Recording(
-        name=path.stem,
-        channels=channels,
-        title=import_map.title or path.stem,
-        source=import_map.source,
-        licence=import_map.licence,
-        path=path,
-        sha256=sha256,
-        attributes={"imported_from": path.name, "imported_sha256": sha256, **_origin(file, origin)},
-    )
-    _raise(check_recording(recording, str(path)))
-    return recording
+    return values, origin
 
 
-def static_points_of(file: ForeignFile, import_map: ImportMap, path: Path) -> StaticPoints:
-    """Turn the mapped columns into static points in SI units; raises FrictionOcpError with every finding."""
-    wanted = _wanted(file, import_map)
-    check_sizes(path, [item.signal for item in wanted.values()])
-    raw = file.read(sorted({item.index for item in wanted.values()}))
-    findings: list[Finding] = []
-    values: dict[str, FloatArray] = {}
-    units: dict[str, str] = {}
-    for place, item in wanted.items():
-        name = place.removeprefix("points.")
-        try:
-            values[name], units[name] = _converted(raw[item.index], item, 0, path)
-        except FrictionOcpError as error:
-            findings += error.findings
-    _raise(findings)
+def _provenance(import_map: ImportMap, path: Path, more: Mapping[str, str] = {}) -> dict[str, Any]:
+    """Return what recordings and static points say of where they come from."""
     sha256 = _fingerprint(path)
-    points = StaticPoints(
-        name=path.stem,
-        speed=values.pop("speed"),
-        units=units,
-        **values,
-        title=import_map.title or path.stem,
-        source=import_map.source,
-        licence=import_map.licence,
-        path=path,
-        sha256=sha256,
-        attributes={"imported_from": path.name, "imported_sha256": sha256},
-    )
-    _raise(check_static_points(points, str(path)))
-    return points
+    return {
+        "name": path.stem,
+        "title": import_map.title or path.stem,
+        "source": import_map.source,
+        "licence": import_map.licence,
+        "path": path,
+        "sha256": sha256,
+        "attributes": {"imported_from": path.name, "imported_sha256": sha256, **more},
+    }
 
 
 def _is_time(place: str) -> bool:
