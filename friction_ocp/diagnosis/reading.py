@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel, polished
-from friction_ocp.diagnosis.worth import OF_REST, Key, innovations, prescribed
+from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
@@ -70,6 +70,6 @@ def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
     """
     drive, clues = base.model.problem.drive, clues_of(base)
     for effect, place in keys:
-        if place in {*effects()[effect].places(drive), *prescribed(drive)}:
+        if place in {*effects()[effect].places(drive), *drive.prescribed}:
             drive = effects()[effect].augment(drive, place, clues).drive
     return drive

@@ -13,7 +13,6 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Rival
-from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates
 
 REFITTED = 6
@@ -35,17 +34,12 @@ def places(current: FittedModel, names: list[str]) -> list[Key]:
     """Return effects and places; static points also show friction of shafts whose motion an input prescribes."""
     drive = current.model.problem.drive
     found = [(effect.name, place) for effect, place in candidates(drive, names)]
-    driven = prescribed(drive)
+    driven = drive.prescribed
     if not current.model.static or not driven:
         return found
     channels = tuple(replace(item, role="output") if item.part in driven else item for item in drive.channels)
     free = candidates(replace(drive, channels=channels), names)
     return list(dict.fromkeys([*found, *((effect.name, place) for effect, place in free if place in driven)]))
-
-
-def prescribed(drive: Drive) -> set[str]:
-    """Return the shafts whose motion is an input."""
-    return {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
 
 
 def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:

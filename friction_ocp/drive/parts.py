@@ -273,6 +273,12 @@ class Drive:
         return next((clock for clock in self.clocks if clock.name == channel.clock), None)
 
     @property
+    def prescribed(self) -> frozenset[str]:
+        """The shafts whose motion is an input."""
+        parts = {channel.part for channel in self.inputs if channel.signal in ("theta", "omega")}
+        return frozenset(shaft.name for shaft in self.shafts if shaft.name in parts)
+
+    @property
     def inputs(self) -> tuple[Channel, ...]:
         """The channels that drive the simulation."""
         return tuple(channel for channel in self.channels if channel.role == "input")

@@ -261,8 +261,7 @@ def channel(drive: Drive, name: str) -> Channel:
 
 def moving_shafts(drive: Drive) -> list[Shaft]:
     """Return the shafts whose motion is not prescribed by an input, and those of which an output sees what it takes."""
-    driven = {item.part for item in drive.inputs if item.signal in ("theta", "omega")}
     seen = {item.part for item in drive.outputs}
     held = {motor.shaft for motor in drive.motors if seen & {motor.name}}
-    driven -= held | {item.part for item in drive.outputs if item.signal == DRIVE_TORQUE}
+    driven = drive.prescribed - held - {item.part for item in drive.outputs if item.signal == DRIVE_TORQUE}
     return [shaft for shaft in drive.shafts if shaft.name not in driven]

@@ -34,7 +34,7 @@ def fits_free_run(model: Model) -> bool:
 def is_held(drive: Drive) -> bool:
     """Whether every shaft is tied, through transmissions, to something that keeps it from drifting."""
     held = {shaft.name for shaft in drive.shafts if shaft.gravity is not None}
-    held |= {channel.part for channel in drive.inputs if channel.signal in ("theta", "omega")}
+    held |= drive.prescribed
     if drive.controller is not None:
         held |= {motor.shaft for motor in drive.motors}
     for _ in drive.transmissions:

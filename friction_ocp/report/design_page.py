@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from friction_ocp.plots.numbers import percent, significant, unit_text
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.design_words import chance, design_sentence, limits_sentence
 from friction_ocp.report.page import paragraphs, render_page
+from friction_ocp.report.pictures import embedded_png
 from friction_ocp.whole_file import write_text
 
 WORTH = {
@@ -23,7 +23,6 @@ WORTH = {
 
 def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -> None:
     """Write report.html in one step; `figures` are PNG files by name."""
-    pictures = {name: base64.b64encode(file.read_bytes()).decode() for name, file in figures.items()}
     page = render_page(
         "design.html",
         {
@@ -36,7 +35,7 @@ def write_design_report(result: Json, figures: Mapping[str, Path], path: Path) -
             "parameters": _parameters(result),
             "decides": bool(rows(result, "separates")),
             "worth": WORTH.get(str(result.get("criterion")), ""),
-            "figures": pictures,
+            "figures": {name: embedded_png(file) for name, file in figures.items()},
         },
     )
     write_text(path, page)

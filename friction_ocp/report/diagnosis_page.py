@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from friction_ocp.plots.numbers import NOTHING, plain, significant, unit_text, w
 from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.diagnosis_words import alias_sentences, bias_sentences, diagnosis_sentence, round_sentence
 from friction_ocp.report.page import paragraphs, render_page
+from friction_ocp.report.pictures import embedded_png
 from friction_ocp.whole_file import write_text
 
 LISTED = 6
@@ -24,15 +24,6 @@ def write_diagnosis_report(result: Json, figures: Mapping[str, Path], path: Path
 
 def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
     """Return the page."""
-    from markupsafe import Markup
-
-    def figure(name: str) -> Markup:
-        if name not in figures:
-            return Markup("")
-        data = base64.b64encode(figures[name].read_bytes()).decode()
-        picture = '<div class="scroll" role="region" aria-label="{0}" tabindex="0"><img alt="{0}" src="{1}"></div>'
-        return Markup(picture).format(name, f"data:image/png;base64,{data}")
-
     gap, following = part(result, "gap"), result.get("next_experiment")
     return render_page(
         "diagnosis.html",
@@ -52,7 +43,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "next": str(following["text"]) if following else "",
             "traces": [name for name in figures if name.startswith("before-after-")],
             "assumptions": rows(result, "assumptions"),
-            "figure": figure,
+            "figures": {name: embedded_png(file) for name, file in figures.items()},
         },
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from friction_ocp.report.fleet_words import (
     when_text,
 )
 from friction_ocp.report.page import facts, paragraphs, render_page
+from friction_ocp.report.pictures import embedded_svg
 from friction_ocp.report.section import interval_text
 from friction_ocp.report.tables import Cell
 from friction_ocp.whole_file import write_text
@@ -32,7 +32,7 @@ def write_fleet_report(result: Json, path: Path) -> None:
 def render_fleet(result: Json) -> str:
     """Return the page."""
     with figure_style():
-        figures = {name: base64.b64encode(svg_text(one).encode()).decode() for name, one in fleet_figures(result)}
+        figures = {name: embedded_svg(svg_text(one)) for name, one in fleet_figures(result)}
     provenance = {key: value for key, value in result["provenance"].items() if not isinstance(value, Mapping | list)}
     drifts, outliers = flagged(result), rows(result, "outliers")
     return render_page(

@@ -113,41 +113,41 @@
     };
   }
 
+  function curveFigure(title, label, curve, layout) {
+    return {
+      title, label, height: 290, layout,
+      data: [{
+        type: "scatter", mode: "lines", name: curve.name, x: curve.x, y: curve.y, meta: curve.colour,
+        line: { color: colour(curve.colour), width: 1.6 }, hovertemplate: "%{y:.3f}",
+      }],
+    };
+  }
+
   function residualFigure(residual) {
     const band = residual.band === null ? [] : [{
       type: "rect", xref: "paper", x0: 0, x1: 1, y0: -residual.band, y1: residual.band, layer: "below",
       line: { width: 0 }, fillcolor: colour("muted"), opacity: 0.25,
     }];
-    return {
-      title: residual.name + ": " + (residual.white ? "white" : "not white"),
-      label: "Autocorrelation of the residual of " + residual.name + " over the lag",
-      height: 290,
-      data: [{
-        type: "scatter", mode: "lines", name: "autocorrelation", x: residual.lag, y: residual.autocorrelation,
-        meta: "residual", line: { color: colour("residual"), width: 1.6 }, hovertemplate: "%{y:.3f}",
-      }],
-      layout: {
+    const curve = { name: "autocorrelation", x: residual.lag, y: residual.autocorrelation, colour: "residual" };
+    return curveFigure(
+      residual.name + ": " + (residual.white ? "white" : "not white"),
+      "Autocorrelation of the residual of " + residual.name + " over the lag", curve, {
         shapes: band,
         xaxis: axis("lag in s", { zeroline: false }),
         yaxis: axis("autocorrelation", { range: [-1.05, 1.05] }),
       },
-    };
+    );
   }
 
   function coherenceFigure(found) {
-    return {
-      title: found.name + ": " + found.explained,
-      label: "Coherence of measured and simulated " + found.name + " over the frequency",
-      height: 290,
-      data: [{
-        type: "scatter", mode: "lines", name: "coherence", x: found.frequency, y: found.share,
-        meta: "simulated", line: { color: colour("simulated"), width: 1.6 }, hovertemplate: "%{y:.3f}",
-      }],
-      layout: {
+    const curve = { name: "coherence", x: found.frequency, y: found.share, colour: "simulated" };
+    return curveFigure(
+      found.name + ": " + found.explained,
+      "Coherence of measured and simulated " + found.name + " over the frequency", curve, {
         xaxis: axis("frequency in Hz", { type: "log", zeroline: false }),
         yaxis: axis("coherence", { range: [-0.02, 1.05] }),
       },
-    };
+    );
   }
 
   function frame(holder, figure) {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from pathlib import Path
 
 from friction_ocp.plots.numbers import NOTHING, percent, significant, to_resolution, unit_text
@@ -10,6 +9,7 @@ from friction_ocp.plots.reading import Json, objects, rows
 from friction_ocp.plots.side_by_side import side_by_side_figure
 from friction_ocp.plots.style import figure_style, svg_text
 from friction_ocp.report.page import render_page
+from friction_ocp.report.pictures import embedded_svg
 from friction_ocp.report.section import StatisticSection, StatisticTable, columns, table_lines
 from friction_ocp.whole_file import write_text
 
@@ -25,7 +25,7 @@ def write_side_by_side(document: Json, path: Path) -> None:
 def render_side_by_side(document: Json) -> str:
     """Return the page."""
     with figure_style():
-        figure = base64.b64encode(svg_text(side_by_side_figure(document)).encode()).decode()
+        figure = embedded_svg(svg_text(side_by_side_figure(document)))
     section = StatisticSection(
         kind="Results side by side",
         title="Parameters and errors",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import replace
 
 from friction_ocp.plots.figures import statistic_figures
@@ -10,6 +9,7 @@ from friction_ocp.plots.reading import Json, part
 from friction_ocp.plots.style import figure_style, svg_text
 from friction_ocp.report.bootstrap_section import bootstrap_section
 from friction_ocp.report.models_section import models_section
+from friction_ocp.report.pictures import embedded_svg
 from friction_ocp.report.profile_section import profile_section
 from friction_ocp.report.section import StatisticSection
 from friction_ocp.report.sentence import verdict_sentence
@@ -38,8 +38,8 @@ def drawn_section(result: Json) -> StatisticSection | None:
     if section is None:
         return None
     with figure_style():
-        texts = [svg_text(figure) for _, figure in statistic_figures(result)]
-    return replace(section, figure=base64.b64encode(texts[0].encode()).decode())
+        drawn = [embedded_svg(svg_text(figure)) for _, figure in statistic_figures(result)]
+    return replace(section, figure=drawn[0])
 
 
 def whole_verdict(result: Json) -> str:

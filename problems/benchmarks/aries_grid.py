@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from tracing import Trace, counted
+from tracing import Curve, Trace, counted, draw
 
 from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.model import Model, prepare
@@ -182,25 +182,13 @@ def _row(name: str, cells: Sequence[str]) -> str:
     return f"{name:38}" + "".join(f"{cell:>12}" for cell in cells)
 
 
-def draw(ways: Sequence[Way], truth: Numbers, path: Path) -> None:
-    """Draw error over evaluations, and the levels of the two steps."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(8, 4.5))
-    for way, colour in zip(ways, ("tab:red", "tab:orange", "tab:purple", "tab:green", "tab:blue"), strict=True):
-        if way.trace is None:
-            axes.axhline(error_of(way.numbers, truth), color=colour, ls="--", label=way.name)
-        else:
-            points = np.array(way.trace.points)
-            axes.loglog(points[:, 0], points[:, 2], color=colour, label=way.name)
-    axes.set_xlabel("evaluations (a sensitivity sweep counts 1 + parameters)")
-    axes.set_ylabel("mean relative error of the seven numbers")
-    axes.legend()
-    figure.tight_layout()
-    figure.savefig(path, dpi=150)
+def curves_of(ways: Sequence[Way], truth: Numbers) -> list[Curve]:
+    """Return error over evaluations, and the levels of the two steps."""
+    colours = ("tab:red", "tab:orange", "tab:purple", "tab:green", "tab:blue")
+    return [
+        Curve(colour, way.name, way.trace, error_of(way.numbers, truth))
+        for way, colour in zip(ways, colours, strict=True)
+    ]
 
 
 def main() -> None:
@@ -213,7 +201,7 @@ def main() -> None:
     ways, truth = contest(asked.direction), truth_of(asked.direction)
     print("\n".join(rows(ways, truth)))
     if asked.picture is not None:
-        draw(ways, truth, asked.picture)
+        draw(curves_of(ways, truth), "the seven numbers", asked.picture)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
+from friction_ocp.whole_file import write_text
 
 FOLDER = Path("results") / "coverage"
 LAWS = {"linear": "viscous", "coulomb": "coulomb", "stribeck": "stribeck", "lugre": "lugre", "polyline": "polyline"}
@@ -82,7 +83,7 @@ def best_fitting(folder: Path) -> Mapping[str, float]:
         options = replace(problem.estimation, horizon_s=calibration.SECONDS)
         estimate = identify(replace(problem, estimation=options))
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(dict(estimate.values)), encoding="utf-8")
+        write_text(path, json.dumps(dict(estimate.values)))
     return json.loads(path.read_text(encoding="utf-8"))
 
 

@@ -28,7 +28,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from tracing import Trace, counted
+from tracing import Curve, Trace, counted, draw
 
 from friction_ocp.estimation.agreement import curve_distance
 from friction_ocp.estimation.estimate import identify
@@ -297,23 +297,14 @@ def _off(found: Contest, way: str, name: str) -> float:
     return abs(numbers_of(found.ways[way].values)[name] / numbers_of(found.truth)[name] - 1.0)
 
 
-def draw(contests: Sequence[Contest], path: Path) -> None:
-    """Draw error over evaluations of all ways."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(8, 4.5))
-    for index, item in enumerate(contests):
-        for (name, way), colour in zip(item.ways.items(), ("tab:orange", "tab:red", "tab:blue"), strict=True):
-            points = np.array(way.points)
-            axes.loglog(points[:, 0], points[:, 2], color=colour, label=name if index == 0 else None)
-    axes.set_xlabel("evaluations (a sensitivity sweep counts 1 + parameters)")
-    axes.set_ylabel("mean relative error of c0h c1h c2h R c0l R c1l")
-    axes.legend()
-    figure.tight_layout()
-    figure.savefig(path, dpi=150)
+def curves_of(contests: Sequence[Contest]) -> list[Curve]:
+    """Return error over evaluations of all ways; the first contest names them."""
+    colours = ("tab:orange", "tab:red", "tab:blue")
+    return [
+        Curve(colour, name if index == 0 else None, way)
+        for index, item in enumerate(contests)
+        for (name, way), colour in zip(item.ways.items(), colours, strict=True)
+    ]
 
 
 def main() -> None:
@@ -327,7 +318,7 @@ def main() -> None:
     contests = [contest(5000 * asked.seed + 100 * k) for k in range(asked.draws)]
     print("\n".join(rows(contests)))
     if asked.picture is not None:
-        draw(contests, asked.picture)
+        draw(curves_of(contests), "c0h c1h c2h R c0l R c1l", asked.picture)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from friction_ocp.simulation.kernel import SweepRequest
 from friction_ocp.simulation.sweep import Sweep
@@ -46,3 +49,34 @@ def counted(trace: Trace) -> Callable[[], None]:
         Sweep.run_many = original  # type: ignore[method-assign]
 
     return restore
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The errors of one way in a picture: a search, or the level that a way without one ends at."""
+
+    colour: str
+    name: str | None
+    trace: Trace | None
+    level: float = 0.0
+
+
+def draw(curves: Sequence[Curve], what: str, path: Path) -> None:
+    """Draw error over evaluations; `what` the error is of."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(8, 4.5))
+    for curve in curves:
+        if curve.trace is None:
+            axes.axhline(curve.level, color=curve.colour, ls="--", label=curve.name)
+        else:
+            points = np.array(curve.trace.points)
+            axes.loglog(points[:, 0], points[:, 2], color=curve.colour, label=curve.name)
+    axes.set_xlabel("evaluations (a sensitivity sweep counts 1 + parameters)")
+    axes.set_ylabel(f"mean relative error of {what}")
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)

@@ -84,23 +84,17 @@ def _kinds_of_driving(drive: Drive, motor: Motor) -> set[str]:
     return kinds if drive.controller is None else kinds | {drive.controller.output}
 
 
-def is_prescribed(drive: Drive) -> bool:
-    """Whether the motion of a shaft is an input."""
-    return any(_is_input(drive, f"{shaft.name}.{signal}") for shaft in drive.shafts for signal in ("theta", "omega"))
-
-
 def _moves_as_prescribed(drive: Drive, shaft: str) -> bool:
     """Whether an input prescribes the motion of a shaft, or that of one rigidly joined to it."""
     joined = topology(drive)
-    driven = {channel.part for channel in drive.inputs if channel.signal in ("theta", "omega")}
-    return any(joined.group_of.get(part) == joined.group_of.get(shaft) for part in driven)
+    return any(joined.group_of[part] == joined.group_of.get(shaft) for part in drive.prescribed)
 
 
 def motors_are_driven(case: Case) -> Iterator[Finding]:
     """Each motor follows a measured current, torque or voltage, a commanded current, or the controller."""
     drive = case.drive
     for k, motor in enumerate(drive.motors):
-        driven = ways_of_driving(drive, motor) or is_prescribed(drive) or case.has_points_alone
+        driven = ways_of_driving(drive, motor) or drive.prescribed or case.has_points_alone
         if not driven:
             allowed = (
                 f"an input channel for {motor.name}.current, .current_command, .torque or .voltage, or a controller"
@@ -110,7 +104,7 @@ def motors_are_driven(case: Case) -> Iterator[Finding]:
 
 def something_moves_the_drive(case: Case) -> Iterator[Finding]:
     """Without a motor or a prescribed motion only a free decay is left."""
-    if not case.drive.motors and not is_prescribed(case.drive) and not case.has_points_alone:
+    if not case.drive.motors and not case.drive.prescribed and not case.has_points_alone:
         what = "there is no motor, and no input prescribes the motion of a shaft"
         remedy = "add drive.motor unless the recordings show a free decay"
         yield Finding(case.at("drive"), what, remedy=remedy, severity="warning")
