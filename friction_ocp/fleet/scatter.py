@@ -65,8 +65,9 @@ def levels_of(design: FloatArray, value: FloatArray, std_error: FloatArray, take
         weight = taken / (own + variance[:, None])
         residual = wanted - _lines(design, wanted, weight)[0] @ design.T
         squares, fall = np.sum(weight * residual**2, axis=1), np.sum(weight**2 * residual**2, axis=1)
-        # the squares are convex in the variance: steps from the left never pass the root
-        step = np.where(moving & (squares > freedom), (squares - freedom) / np.maximum(fall, 1e-300), 0.0)
+        # one over the squares is concave in the variance: steps from the left never pass the root
+        step = (squares / np.maximum(freedom, 1) - 1.0) * squares / np.maximum(fall, 1e-300)
+        step = np.where(moving & (squares > freedom), step, 0.0)
         variance += step
         if np.all(step <= _ENOUGH * variance):
             break

@@ -149,9 +149,15 @@ def test_machines_are_told_apart_by_folder_or_attribute(fleet: tuple[Path, Path]
     ],
 )
 def test_wrong_input_is_told_before_anything_is_fitted(
-    arguments: list[str], complaint: str, fleet: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    complaint: str,
+    fleet: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Status 1, and a line that says what is allowed."""
+    monkeypatch.setattr("friction_ocp.execution.cluster.PATIENCE", 1.0)
     (tmp_path / "empty").mkdir()
     (tmp_path / "nights").symlink_to(fleet[0].parent / "nights")
     given = [
