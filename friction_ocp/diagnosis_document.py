@@ -39,7 +39,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         **heading(problem),
         "verdict": diagnosis.verdict,
         "where": _where(diagnosis),
-        "rounds": [_round(diagnosis, item) for item in diagnosis.rounds],
+        "rounds": [_round(diagnosis, k) for k in range(len(diagnosis.rounds))],
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
         "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
         "accepted": [{**_explained(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
@@ -125,7 +125,9 @@ def _curve(found: Shape, drive: Drive) -> dict[str, Any]:
     return {"component": found.component, "variable": found.variable, **units, **numbers}
 
 
-def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
+def _round(diagnosis: Diagnosis, index: int) -> dict[str, Any]:
+    item = diagnosis.rounds[index]
+    earlier = {done.accepted.key for done in diagnosis.rounds[:index] if done.accepted is not None}
     gap = item.accepted is not None or item.excess.significant(diagnosis.level) or diagnosis.left_over
     available = max(item.before.objective - 0.5 * samples(item.before), 1e-300)
     pairs = zip(item.choice.rivals, item.choice.probabilities, strict=True)
@@ -148,6 +150,7 @@ def _round(diagnosis: Diagnosis, item: Round) -> dict[str, Any]:
         "probabilities": dict(probabilities(item.choice, gap)),
         "excess": {"ratio": item.excess.ratio, "p_value": item.excess.p_value},
         "accepted": None if item.accepted is None else _named(item.accepted.key),
+        "reshaped": item.accepted is not None and item.accepted.key in earlier,
         "causes": causes,
     }
 
@@ -180,9 +183,10 @@ def _share(gain: float, available: float) -> float:
 
 def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     """Return the final values of what an accepted effect added."""
-    done = next(item for item in diagnosis.rounds if item.accepted is not None and item.accepted.key == key)
-    assert done.accepted is not None
-    names = _own(done.before, done.accepted.fitted)
+    names = set[str]()
+    for item in diagnosis.rounds:
+        if item.accepted is not None and item.accepted.key == key:
+            names |= _own(item.before, item.accepted.fitted)
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values

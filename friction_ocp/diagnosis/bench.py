@@ -255,5 +255,5 @@ def restored_screened(bench: Bench, content: Json) -> Screened:
     """Return the score test with its drive."""
     found: Mapping[str, Any] = restored(content, (Start, Trial))
     drive = bench.current.model.problem.drive
-    augmentation: Augmentation = effects()[found["effect"]].augment(drive, found["component"], bench.clues)
+    augmentation: Augmentation = effects()[found["effect"]].addition(drive, found["component"], bench.clues)
     return Screened(**found, augmentation=augmentation)

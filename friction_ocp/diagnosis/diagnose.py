@@ -28,6 +28,7 @@ from friction_ocp.diagnosis.worth import (
     is_material,
     places,
     required,
+    shapes,
     shortlist,
 )
 from friction_ocp.effects.registry import effects
@@ -119,21 +120,25 @@ class Diagnosis:
         return largest.component if largest is not None and self.left_over else None
 
     @property
+    def _decided(self) -> list[Round]:
+        """The rounds that brought the accepted effects, and not only another shape of one."""
+        brought = {item.accepted.key: item for item in reversed(self.rounds) if item.accepted is not None}
+        return [brought[key] for key in self.accepted]
+
+    @property
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
         """Sets of candidates that the recordings cannot tell apart, the accepted one first.
 
         What was accepted in another round is there besides, not instead.
         """
-        decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
-        sets = [[rival.key for rival in shown(item.choice.aliases)] for item in decided]
+        sets = [[rival.key for rival in shown(item.choice.aliases)] for item in self._decided]
         left = [(keys[0], *(key for key in keys[1:] if key not in self.accepted)) for keys in sets if keys]
         return tuple(keys for keys in left if len(keys) > 1)
 
     @property
     def same(self) -> tuple[tuple[Key, ...], ...]:
         """Sets of what is one and the same in these recordings, the accepted effect first."""
-        decided = [item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted]
-        sets = [tuple(rival.key for rival in item.choice.same) for item in decided]
+        sets = [tuple(rival.key for rival in item.choice.same) for item in self._decided]
         return tuple(keys for keys in sets if len(keys) > 1)
 
     @property
@@ -186,7 +191,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
                 number,
                 lambda what, share, n=number: tell(f"round {n}: {what}", share),
             )
-            done = _round(crew, names, level, rng, required(base, bench.current))
+            done = _round(crew, names, level, rng, required(base, bench.current), accepted)
             rounds.append(done)
             if done.accepted is None:
                 break
@@ -202,7 +207,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         base=base,
         final=current,
         rounds=tuple(rounds),
-        accepted=tuple(accepted),
+        accepted=tuple(dict.fromkeys(accepted)),
         level=level,
         before=free_errors(base, held_out=True),
         after=free_errors(current, held_out=True),
@@ -236,7 +241,7 @@ def _reexamined(
 
     Superfluous is what neither gains for certain there nor is worth an addition in sum.
     """
-    for key in accepted[:-1]:
+    for key in dict.fromkeys(accepted[:-1]):
         kept = [other for other in accepted if other != key]
         simpler = without_addition(current, with_additions(base, kept))
         blocks = blocks_of(current.linear.rows)
@@ -276,20 +281,29 @@ def _options(problem: Problem) -> tuple[float, list[str]]:
     return float(level), [str(name) for name in wanted if name not in left_out]
 
 
-def _round(crew: Crew, names: list[str], level: float, rng: np.random.Generator, enough: float) -> Round:
+def _round(
+    crew: Crew, names: list[str], level: float, rng: np.random.Generator, enough: float, accepted: Sequence[Key]
+) -> Round:
+    """Decide on an addition; a more general shape of an accepted effect need not be worth an effect of its own."""
     current, blocks = crew.bench.current, crew.bench.blocks
-    found = crew.screened(places(current, names))
+    again = shapes(current, crew.bench.clues, accepted)
+    found = crew.screened([*places(current, names), *again])
     power = excess(current.linear.rows, blocks)
-    hopeful, gap = [item for item in found if item.gain >= HOPE * enough], power.significant(level)
+    hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
+    gap = power.significant(level)
     chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
     choice = choose([], blocks, level, rng)
     for rivals in _completed(crew, chosen):
-        able = [gain(current, item) >= enough and is_material(current, item.fitted) for item in rivals]
+        able = [
+            item.key in again or (gain(current, item) >= enough and is_material(current, item.fitted))
+            for item in rivals
+        ]
         choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
         choice = with_refused(choice, tuple(item for item, yes in zip(rivals, able, strict=True) if not yes))
         if choice.significant or not gap:
             break
-    best = choice.rivals[0] if choice.significant else None
+    shape = next((item for item in choice.aliases if item.key in again), None)
+    best = (shape or choice.rivals[0]) if choice.significant else None
     return Round(tuple(found), choice, current, power, best)
 
 

@@ -66,10 +66,12 @@ def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> f
 def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
     """Return the drive of the base model with some effects, as they would be added in this order.
 
+    What is named again gets a more general shape.
     Values that were taken back are no part of it: they are fitted in the base model already.
     """
     drive, clues = base.model.problem.drive, clues_of(base)
     for effect, place in keys:
-        if place in {*effects()[effect].places(drive), *drive.prescribed}:
-            drive = effects()[effect].augment(drive, place, clues).drive
+        shape = effects()[effect].reshaped(drive, place, clues)
+        if shape is not None or place in {*effects()[effect].places(drive), *drive.prescribed}:
+            drive = effects()[effect].addition(drive, place, clues).drive
     return drive

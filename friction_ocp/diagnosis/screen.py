@@ -71,7 +71,7 @@ def screen(
 ) -> Screened | None:
     """Test an effect at a place; None where the drive with it cannot be simulated."""
     try:
-        augmentation = effect.augment(model.problem.drive, place, clues)
+        augmentation = effect.addition(model.problem.drive, place, clues)
         built = contrast(model, base, augmentation.drive)
     except FrictionOcpError:
         return None

@@ -13,7 +13,8 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Rival
-from friction_ocp.effects.registry import candidates
+from friction_ocp.effects.effect import Clues
+from friction_ocp.effects.registry import candidates, effects
 
 REFITTED = 6
 """Candidates that are refitted in a round."""
@@ -28,6 +29,12 @@ effects of one size each explains half, and of that the same four fifths."""
 
 Key = tuple[str, str]
 """Effect and component."""
+
+
+def shapes(current: FittedModel, clues: Clues, accepted: Sequence[Key]) -> list[Key]:
+    """Return the accepted effects that may have a more general shape than they have."""
+    drive, catalogue = current.model.problem.drive, effects()
+    return [key for key in dict.fromkeys(accepted) if catalogue[key[0]].reshaped(drive, key[1], clues) is not None]
 
 
 def places(current: FittedModel, names: list[str]) -> list[Key]:
@@ -78,12 +85,15 @@ def gain(current: FittedModel, rival: Rival) -> float:
 def is_material(current: FittedModel, fitted: FittedModel) -> bool:
     """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
 
-    Free runs that are lost cannot show it: there the innovations may, as long as the runs get no worse.
+    Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost they
+    show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where most of
+    what they have beyond noise goes.
     """
     before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
     pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
-    if before.lost and after.excess() <= before.excess():
-        pairs.append((innovations(current).beyond, innovations(fitted).beyond))
+    one_step = (innovations(current).beyond, innovations(fitted).beyond)
+    if one_step[1] < 0.5 * one_step[0] or (before.lost and after.excess() <= before.excess()):
+        pairs.append(one_step)
     return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
 
 

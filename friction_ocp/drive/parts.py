@@ -43,6 +43,10 @@ class Disturbance(Wave):
     cosine: Value = quantity("torque", "cosine part of the external torque")
     sine: Value = quantity("torque", "sine part of the external torque")
     period: Value = quantity("time", "period of the external torque", nested="guess")
+    second_cosine: Value = quantity("torque", "cosine part of the second order of the external torque", None)
+    second_sine: Value = quantity("torque", "sine part of the second order of the external torque", None)
+    third_cosine: Value = quantity("torque", "cosine part of the third order of the external torque", None)
+    third_sine: Value = quantity("torque", "sine part of the third order of the external torque", None)
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,10 @@ class Cogging(Wave):
     cosine: Value = quantity("torque", "cosine part of the cogging torque")
     sine: Value = quantity("torque", "sine part of the cogging torque")
     period: Value = quantity("angle", "period of the cogging torque over the shaft's angle", nested="guess")
+    second_cosine: Value = quantity("torque", "cosine part of the second order of the cogging torque", None)
+    second_sine: Value = quantity("torque", "sine part of the second order of the cogging torque", None)
+    third_cosine: Value = quantity("torque", "cosine part of the third order of the cogging torque", None)
+    third_sine: Value = quantity("torque", "sine part of the third order of the cogging torque", None)
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,14 @@ class TorqueRipple(Wave):
     cosine: Value = quantity("dimensionless", "cosine part of the relative torque ripple")
     sine: Value = quantity("dimensionless", "sine part of the relative torque ripple")
     period: Value = quantity("angle", "period of the torque ripple over the shaft's angle", nested="guess")
+    second_cosine: Value = quantity(
+        "dimensionless", "cosine part of the second order of the relative torque ripple", None
+    )
+    second_sine: Value = quantity("dimensionless", "sine part of the second order of the relative torque ripple", None)
+    third_cosine: Value = quantity(
+        "dimensionless", "cosine part of the third order of the relative torque ripple", None
+    )
+    third_sine: Value = quantity("dimensionless", "sine part of the third order of the relative torque ripple", None)
 
 
 @dataclass(frozen=True)
@@ -130,6 +146,10 @@ class KinematicError(Wave):
     cosine: Value = quantity("angle", "cosine part of the kinematic error")
     sine: Value = quantity("angle", "sine part of the kinematic error")
     period: Value = quantity("input_angle", "period of the kinematic error over the input angle", nested="guess")
+    second_cosine: Value = quantity("angle", "cosine part of the second order of the kinematic error", None)
+    second_sine: Value = quantity("angle", "sine part of the second order of the kinematic error", None)
+    third_cosine: Value = quantity("angle", "cosine part of the third order of the kinematic error", None)
+    third_sine: Value = quantity("angle", "sine part of the third order of the kinematic error", None)
 
 
 @dataclass(frozen=True)

@@ -207,6 +207,17 @@ class AbstractEffect(ABC):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         """Return the drive with the effect at a place."""
 
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive whose effect at a place has a more general shape than `augment` gave it, if there is one.
+
+        What a machine has is never quite of the shape that a catalogue gives it.
+        """
+        return None
+
+    def addition(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        """Return the drive with the effect at a place; of a more general shape where it has it there already."""
+        return self.reshaped(drive, place, clues) or self.augment(drive, place, clues)
+
 
 def change_shaft(drive: Drive, name: str, **changes: Any) -> Drive:
     """Return the drive with some fields of a shaft replaced."""

@@ -27,6 +27,11 @@ SHARE = 0.05
 """Size of a trial over the torque that moves the shaft: small, yet far above rounding."""
 
 
+EXPONENT = 2.0
+"""Of the Stribeck curve, as long as nothing else is known. Source: Bo & Pavelescu 1982 find 0.5 to 1, Tustin 1947
+takes 1, Armstrong-Helouvry 1991 takes 2."""
+
+
 def with_friction(drive: Drive, shaft: Shaft, **terms: Any) -> Drive:
     """Return the drive with terms added to the friction of a shaft."""
     element = shaft.friction
@@ -63,10 +68,18 @@ class StribeckEffect(AbstractEffect):
         speed = clues.typical_speed(place)
         speeds = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
         guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
-        rise = StribeckRise(upwards(size), guess, 2.0)
+        rise = StribeckRise(upwards(size), guess, EXPONENT)
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.omega_s": omega_s}) for omega_s in speeds)
         added = with_friction(drive, drive.shaft(place), stribeck=rise)
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        terms, path = added_terms(drive.shaft(place).friction.law), f"{place}.friction.added.stribeck.delta"
+        if terms is None or terms.stribeck is None or terms.stribeck.delta != EXPONENT:
+            return None
+        rise = replace(terms.stribeck, delta=Free(EXPONENT, 0.3, 6.0))
+        added = with_friction(drive, drive.shaft(place), stribeck=rise)
+        return Augmentation(added, {path: EXPONENT}, (Trial(({path: 0.9 * EXPONENT},)),))
 
 
 class PolylineBreakEffect(AbstractEffect):

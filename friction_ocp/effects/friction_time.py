@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
-from friction_ocp.friction.composite import plain_law
+from friction_ocp.friction.composite import plain_law, viscous_part
 from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Free
@@ -38,3 +38,13 @@ class WarmUpEffect(AbstractEffect):
             trials = tuple(Trial(({f"{path}.amplitude": -0.05},), {f"{path}.time_constant": one}) for one in times)
         element = replace(shaft.friction, warm_up=part)
         return Augmentation(change_shaft(drive, place, friction=element), off, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        element, path = drive.shaft(place).friction, f"{place}.friction.warm_up.viscous_excess"
+        drift = element.warm_up
+        if drift is None or not isinstance(drift.amplitude, Free) or drift.viscous_excess is not None:
+            return None
+        if viscous_part(element.law) is None:
+            return None
+        changed = replace(element, warm_up=replace(drift, viscous_excess=Free(-0.1, -5.0, 5.0)))
+        return Augmentation(change_shaft(drive, place, friction=changed), {path: 0.0}, (Trial(({path: -0.05},)),))

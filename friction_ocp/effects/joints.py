@@ -17,7 +17,7 @@ from friction_ocp.effects.effect import (
     transmission,
     upwards,
 )
-from friction_ocp.effects.periodic import wave
+from friction_ocp.effects.periodic import overtones, wave
 from friction_ocp.parameters import Free, is_off
 
 
@@ -128,4 +128,11 @@ class KinematicErrorEffect(AbstractEffect):
         ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
         periods = [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
         part, off, trials = wave(KinematicError, f"{place}.kinematic_error", 0.1 * twist, periods)
+        return Augmentation(change_transmission(drive, place, kinematic_error=part), off, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        error = transmission(drive, place).kinematic_error
+        if error is None or error.has_overtones:
+            return None
+        part, off, trials = overtones(error, f"{place}.kinematic_error", clues)
         return Augmentation(change_transmission(drive, place, kinematic_error=part), off, trials)

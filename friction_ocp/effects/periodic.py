@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from friction_ocp.drive.parts import Cogging, Disturbance, Drive, Eccentricity, Motor, TorqueRipple
 from friction_ocp.effects.effect import (
     AbstractEffect,
@@ -36,6 +38,20 @@ def wave(
     return kind(amplitude, amplitude, period), dict.fromkeys(paths, 0.0), trials
 
 
+OVERTONE = 0.1
+"""Size of a trial overtone over the wave's own."""
+
+
+def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
+    """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
+    own = float(np.hypot(clues.numbers.get(f"{path}.cosine", 1.0), clues.numbers.get(f"{path}.sine", 1.0)))
+    size = OVERTONE * own or OVERTONE
+    names = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
+    paths = [f"{path}.{name}" for name in names]
+    trial = Trial(tuple({name: size} for name in paths))
+    return replace(part, **dict.fromkeys(names, either_way(size))), dict.fromkeys(paths, 0.0), (trial,)
+
+
 class PositionRippleEffect(AbstractEffect):
     """Friction varies with the angle."""
 
@@ -48,6 +64,13 @@ class PositionRippleEffect(AbstractEffect):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         path, element = f"{place}.friction.ripple", drive.shaft(place).friction
         part, off, trials = wave(Ripple, path, SHARE, clues.periods(place, "theta", against_motion=True))
+        return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        element = drive.shaft(place).friction
+        if element.ripple is None or element.ripple.has_overtones:
+            return None
+        part, off, trials = overtones(element.ripple, f"{place}.friction.ripple", clues)
         return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
 
 
@@ -73,6 +96,13 @@ class CoggingEffect(AbstractEffect):
         part, off, trials = wave(Cogging, f"{motor.name}.cogging", size, periods)
         return Augmentation(change_motor(drive, motor.name, cogging=part), off, trials)
 
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        motor = motor_of(drive, place)
+        if motor is None or motor.cogging is None or motor.cogging.has_overtones:
+            return None
+        part, off, trials = overtones(motor.cogging, f"{motor.name}.cogging", clues)
+        return Augmentation(change_motor(drive, motor.name, cogging=part), off, trials)
+
 
 class TorqueRippleEffect(AbstractEffect):
     """Torque periodic in the motor angle and proportional to current."""
@@ -90,6 +120,13 @@ class TorqueRippleEffect(AbstractEffect):
         part, off, trials = wave(TorqueRipple, f"{motor.name}.torque_ripple", SHARE, periods)
         return Augmentation(change_motor(drive, motor.name, torque_ripple=part), off, trials)
 
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        motor = motor_of(drive, place)
+        if motor is None or motor.torque_ripple is None or motor.torque_ripple.has_overtones:
+            return None
+        part, off, trials = overtones(motor.torque_ripple, f"{motor.name}.torque_ripple", clues)
+        return Augmentation(change_motor(drive, motor.name, torque_ripple=part), off, trials)
+
 
 class PeriodicDisturbanceEffect(AbstractEffect):
     """External torque periodic in time."""
@@ -103,6 +140,13 @@ class PeriodicDisturbanceEffect(AbstractEffect):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         path, size = f"{place}.disturbance", SHARE * clues.typical_torque[place]
         part, off, trials = wave(Disturbance, path, size, clues.periods(place, "time"))
+        return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        wave_there = drive.shaft(place).disturbance
+        if wave_there is None or wave_there.has_overtones:
+            return None
+        part, off, trials = overtones(wave_there, f"{place}.disturbance", clues)
         return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
 
 

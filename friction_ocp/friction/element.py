@@ -78,8 +78,8 @@ class FrictionElement:
         if self.ripple is not None:
             level = positive_part(1.0 + self.ripple.value(surroundings.theta, surroundings.passed))
         if self.warm_up is not None:
-            viscous = positive_part(self.warm_up.factor(surroundings))
-            level = level * viscous
+            dry, viscous = map(positive_part, self.warm_up.factors(surroundings))
+            level = level * dry
         load = None if self.load is None else self.load.scaled(level, viscous)
         return FrictionElement(self.law.scaled(level, viscous), load)
 

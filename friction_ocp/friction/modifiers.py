@@ -31,19 +31,29 @@ class Ripple(Wave):
     cosine: Value = quantity("dimensionless", "cosine part of the relative change of dry friction over the angle")
     sine: Value = quantity("dimensionless", "sine part of the relative change of dry friction over the angle")
     period: Value = quantity("angle", "period of the friction over the angle", nested="guess")
+    second_cosine: Value = quantity(
+        "dimensionless", "cosine part of the second order of the change of dry friction", None
+    )
+    second_sine: Value = quantity("dimensionless", "sine part of the second order of the change of dry friction", None)
+    third_cosine: Value = quantity(
+        "dimensionless", "cosine part of the third order of the change of dry friction", None
+    )
+    third_sine: Value = quantity("dimensionless", "sine part of the third order of the change of dry friction", None)
 
 
 @dataclass(frozen=True)
 class WarmUp:
     """All friction times 1 + per_kelvin (T - reference_temperature) + amplitude (1 - exp(-t / time_constant)).
 
-    T is the measured temperature, t the time since the start of the recording.
+    T is the measured temperature, t the time since the start of the recording; `viscous_excess` is added to the
+    amplitude where viscous friction is meant.
     """
 
     per_kelvin: Value = quantity("per_kelvin", "relative change of friction with the temperature", 0.0)
     amplitude: Value = quantity("dimensionless", "relative change of friction in the long run", 0.0)
     time_constant: Value = quantity("time", "time in which friction settles", None, nested="guess")
     reference_temperature: Value = quantity("temperature", "temperature at which friction has its values", 20.0)
+    viscous_excess: Value = quantity("dimensionless", "relative change of viscous friction beyond that of all", None)
 
     @property
     def idle(self) -> bool:
@@ -59,14 +69,16 @@ class WarmUp:
             amplitude,
             None if amplitude is None else self.time_constant,
             None if per_kelvin is None else self.reference_temperature,
+            None if amplitude is None else self.viscous_excess,
         )
 
-    def factor(self, surroundings: Surroundings) -> Any:
-        """Return the factor on all friction."""
-        factor: Any = 1.0
+    def factors(self, surroundings: Surroundings) -> tuple[Any, Any]:
+        """Return the factors on dry and on viscous friction."""
+        dry: Any = 1.0
         if self.per_kelvin is not None:
-            factor = factor + self.per_kelvin * (surroundings.temperature - self.reference_temperature)
-        if self.amplitude is not None:
-            risen = -expm1(-surroundings.time / self.time_constant)
-            factor = factor + self.amplitude * risen
-        return factor
+            dry = dry + self.per_kelvin * (surroundings.temperature - self.reference_temperature)
+        if self.amplitude is None:
+            return dry, dry
+        risen = -expm1(-surroundings.time / self.time_constant)
+        dry = dry + self.amplitude * risen
+        return dry, dry if self.viscous_excess is None else dry + self.viscous_excess * risen

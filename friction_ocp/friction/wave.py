@@ -1,4 +1,4 @@
-"""What repeats over an angle or over time: one cosine and one sine with a common period."""
+"""What repeats over an angle or over time: cosine and sine of a period and, where there are any, of its overtones."""
 
 from __future__ import annotations
 
@@ -12,37 +12,62 @@ from friction_ocp.parameters import Value, is_off
 
 @dataclass(frozen=True)
 class Wave:
-    r"""Numbers of :math:`c \cos(2 \pi x / P) + s \sin(2 \pi x / P)`; who uses it says what x is.
+    r"""Numbers of :math:`\sum_k c_k \cos(2 \pi k x / P) + s_k \sin(2 \pi k x / P)`; who uses it says what x is.
 
-    A subclass declares the three fields with their units.
+    A subclass declares the fields with their units; overtones that are None are none.
     """
 
     cosine: Value
     sine: Value
     period: Value
+    second_cosine: Value
+    second_sine: Value
+    third_cosine: Value
+    third_sine: Value
 
     @property
     def idle(self) -> bool:
-        """Whether both amplitudes are plainly zero, so that the wave is none."""
-        return is_off(self.cosine) and is_off(self.sine)
+        """Whether all amplitudes are plainly zero, so that the wave is none."""
+        return all(is_off(part) for _, *parts in self._terms() for part in parts)
+
+    @property
+    def has_overtones(self) -> bool:
+        """Whether it is more than one cosine and one sine."""
+        return len(self._terms()) > 1
+
+    def _terms(self) -> list[tuple[int, Any, Any]]:
+        """Return order, cosine part and sine part of what there is."""
+        overtones = (2, self.second_cosine, self.second_sine), (3, self.third_cosine, self.third_sine)
+        found: list[tuple[int, Any, Any]] = [(1, self.cosine, self.sine)]
+        for order, *parts in overtones:
+            if any(part is not None for part in parts):
+                cosine, sine = (0.0 if part is None else part for part in parts)
+                found.append((order, cosine, sine))
+        return found
 
     def value(self, at: Any, passed: Any = None) -> Any:
         """Return the wave at x; its mean from x - passed / 2 to x + passed / 2 where that is given.
 
         A wave that is passed within less than a step is so averaged instead of sampled.
         """
-        rate = 2.0 * math.pi / self.period
-        phase = rate * at
-        value = self.cosine * cos(phase) + self.sine * sin(phase)
-        return value if passed is None else value * sinc(0.5 * rate * passed)
+        return self._sum(at, passed, 0)
 
     def slope(self, at: Any, passed: Any = None) -> Any:
         """Return the derivative of the wave by x, or its mean as in `value`."""
-        rate = 2.0 * math.pi / self.period
-        phase = rate * at
-        value = rate * (self.sine * cos(phase) - self.cosine * sin(phase))
-        return value if passed is None else value * sinc(0.5 * rate * passed)
+        return self._sum(at, passed, 1)
 
     def bend(self, at: Any, passed: Any = None) -> Any:
         """Return the second derivative of the wave by x, or its mean as in `value`."""
-        return -((2.0 * math.pi / self.period) ** 2) * self.value(at, passed)
+        return self._sum(at, passed, 2)
+
+    def _sum(self, at: Any, passed: Any, derivatives: int) -> Any:
+        """Return the sum of all orders, derived once or twice by x: each time cosine and sine change places."""
+        total: Any = None
+        for order, cosine, sine in self._terms():
+            rate = 2.0 * math.pi * order / self.period
+            for _ in range(derivatives):
+                cosine, sine = rate * sine, -rate * cosine
+            value = cosine * cos(rate * at) + sine * sin(rate * at)
+            value = value if passed is None else value * sinc(0.5 * rate * passed)
+            total = value if total is None else total + value
+        return total

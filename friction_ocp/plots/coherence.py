@@ -21,6 +21,7 @@ def coherence_figure(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Fi
             if channel in by_channel:
                 share = by_channel[channel]
                 axes.semilogx(share["frequency_hz"], share["share"], color=SIMULATED)
+                axes.xaxis.set_major_formatter("{x:g}")
                 text = f"{percent(share.get('explained'))} of the power"
                 axes.text(0.01, 0.03, text, transform=axes.transAxes, fontsize=9)
             axes.set_ylim(-0.02, 1.05)

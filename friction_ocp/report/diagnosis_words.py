@@ -50,7 +50,10 @@ def round_sentence(item: Json) -> str:
     accepted = part(item, "accepted")
     tried = any(cause.get("refit_gain") is not None for cause in rows(item, "causes"))
     why = ": no candidate is certain to help on recordings left out" if tried else ""
-    decided, when = (f"Added: {_named(accepted)}.", "Before it") if accepted else (f"Nothing was added{why}.", "So far")
+    added = "Given a more general shape" if item.get("reshaped") else "Added"
+    decided, when = (
+        (f"{added}: {_named(accepted)}.", "Before it") if accepted else (f"Nothing was added{why}.", "So far")
+    )
     power = significant(part(item, "excess")["ratio"], 2)
     return (
         f"{decided} {when} the errors of one-step predictions have {power} times the power of their noise. "

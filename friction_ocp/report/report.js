@@ -144,7 +144,7 @@
     return curveFigure(
       found.name + ": " + found.explained,
       "Coherence of measured and simulated " + found.name + " over the frequency", curve, {
-        xaxis: axis("frequency in Hz", { type: "log", zeroline: false }),
+        xaxis: axis("frequency in Hz", { type: "log", zeroline: false, dtick: 1, tickformat: "~g" }),
         yaxis: axis("coherence", { range: [-0.02, 1.05] }),
       },
     );

@@ -54,9 +54,11 @@ def command(t: float) -> float:
     return BASE + RAMP * t
 
 
-def wave(amplitudes: tuple[float, float], period: float, at: float) -> float:
-    cosine, sine = amplitudes
-    return float(cosine * np.cos(2 * np.pi * at / period) + sine * np.sin(2 * np.pi * at / period))
+def wave(amplitudes: Sequence[float], period: float, at: float, derivative: int = 0) -> float:
+    """Return the wave of cosine and sine parts, order by order, or a derivative of it by its argument."""
+    parts = [complex(cosine, -sine) for cosine, sine in zip(amplitudes[::2], amplitudes[1::2], strict=True)]
+    rates = 2j * np.pi / period * np.arange(1, 1 + len(parts))
+    return float(np.sum(np.real(parts * rates**derivative * np.exp(rates * at))))
 
 
 @dataclass(frozen=True)
@@ -100,8 +102,12 @@ def one_mass(torque: Callable[[float, float, float], float]) -> Rates:
     return lambda t, x: [x[1], torque(t, x[0], x[1]) / J]
 
 
+def risen(t: float) -> float:
+    return 1 - float(np.exp(-t / 0.15))
+
+
 def warmth(t: float) -> float:
-    return 1 + 0.01 * (TEMPERATURE - 20) - 0.3 * (1 - np.exp(-t / 0.15))
+    return 1 + 0.01 * (TEMPERATURE - 20) - 0.3 * risen(t)
 
 
 def bristle(t: float, x: Sequence[float]) -> list[float]:
@@ -126,15 +132,14 @@ PAIR_MOVING = {"axis.theta": 0.2, "load.theta": 0.01, "axis.omega": 15.0, "load.
 
 
 def two_masses(
-    cubic: float = 0.0, error: tuple[float, float] = (0.0, 0.0), loop: float = 0.0
+    cubic: float = 0.0, error: Sequence[float] = (0.0, 0.0), loop: float = 0.0
 ) -> Callable[[float, Sequence[float]], list[float]]:
     """Return the equations of the pair with a cubic spring, a kinematic error over the motor angle, and a loop."""
 
     def rates(t: float, x: Sequence[float]) -> list[float]:
         q, p, v, w = x[:4]
         z = x[4] if len(x) > 4 else 0.0
-        turn = 2 * np.pi / ERROR_PERIOD
-        transfer = 1 / RATIO + turn * (error[1] * np.cos(turn * q) - error[0] * np.sin(turn * q))
+        transfer = 1 / RATIO + wave(error, ERROR_PERIOD, q, 1)
         twist, rate = q / RATIO + wave(error, ERROR_PERIOD, q) - p, transfer * v - w
         torque = STIFFNESS * twist + cubic * twist**3 + DAMPING * rate + loop * z / LOOP_TWIST
         motor = (command(t) - 0.1 - 0.02 * v - transfer * torque) / J
@@ -145,27 +150,27 @@ def two_masses(
 
 
 RIGID_ERROR = (0.008, -0.006)
+OVERTONES = (*RIGID_ERROR, 0.0, 0.001, -0.0005, 0.0)
 LOADED_ERROR, RIGID_SHARE = (6e-4, -8e-4), 0.2
 """An error whose inertial torque does not turn the load of the joint, at which friction has a kink."""
 
 
-def geared(error: tuple[float, float] = RIGID_ERROR, share: float = 0.0) -> Drive:
+def geared(error: Sequence[float] = RIGID_ERROR, share: float = 0.0) -> Drive:
     """Motor and load joined rigidly, the ratio rippling; the friction of the motor may grow with the load."""
-    joint = Transmission("axis", "load", RATIO, kinematic_error=KinematicError(*error, ERROR_PERIOD))
+    ripple = KinematicError(error[0], error[1], ERROR_PERIOD, *error[2:])
+    joint = Transmission("axis", "load", RATIO, kinematic_error=ripple)
     load = None if share == 0.0 else LoadDependence(share)
     shafts = (Shaft("axis", J, FrictionElement(LAW, load)), Shaft("load", 0.5, FrictionElement(Viscous(0.1))))
     channels = (Channel("torque", "servo.torque", "input"), Channel("load", "load.theta"))
     return Drive(shafts, (joint,), (Motor("servo", "axis"),), None, channels)
 
 
-def rigid(error: tuple[float, float] = RIGID_ERROR, share: float = 0.0) -> Rates:
+def rigid(error: Sequence[float] = RIGID_ERROR, share: float = 0.0) -> Rates:
     """Return the equations of two masses whose angles are tied by load = motor / ratio + error(motor)."""
 
     def rates(t: float, x: Sequence[float]) -> list[float]:
         q, v = x
-        turn, (cosine, sine) = 2 * np.pi / ERROR_PERIOD, error
-        slope = 1 / RATIO + turn * (sine * np.cos(turn * q) - cosine * np.sin(turn * q))
-        bend = -(turn**2) * wave(error, ERROR_PERIOD, q)
+        slope, bend = 1 / RATIO + wave(error, ERROR_PERIOD, q, 1), wave(error, ERROR_PERIOD, q, 2)
         # the joint carries T = 0.5 (slope a + bend v^2) + 0.1 slope v, the motor slope T and the friction share |T| / 5
         known, per_a = 0.5 * bend * v**2 + 0.1 * slope * v, 0.5 * slope
         driving = command(t) - 0.1 - 0.02 * v
@@ -198,6 +203,7 @@ def lagged(t: float, x: Sequence[float]) -> list[float]:
 CASES: dict[str, Case] = {
     "rigid kinematic error": Case(geared(), MOVING, rigid()),
     "loaded rigid kinematic error": Case(geared(LOADED_ERROR, RIGID_SHARE), MOVING, rigid(LOADED_ERROR, RIGID_SHARE)),
+    "rigid kinematic error with overtones": Case(geared(OVERTONES), MOVING, rigid(OVERTONES)),
     "stiffening": Case(pair(replace(SPRING, stiffening=2e5)), PAIR_MOVING, two_masses(2e5)),
     "kinematic error": Case(
         pair(replace(SPRING, kinematic_error=KinematicError(*ERROR, ERROR_PERIOD))),
@@ -219,6 +225,13 @@ CASES: dict[str, Case] = {
         axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
         MOVING,
         one_mass(lambda t, q, v: command(t) + wave((0.05, 0.08), PERIOD, q) - 0.1 - 0.02 * v),
+    ),
+    "cogging with overtones": Case(
+        axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD, 0.03, -0.02, None, 0.04))),
+        MOVING,
+        one_mass(
+            lambda t, q, v: command(t) + wave((0.05, 0.08, 0.03, -0.02, 0, 0.04), PERIOD, q) - 0.1 - 0.02 * v,
+        ),
     ),
     "torque ripple": Case(
         axis(PLAIN, Motor("servo", "axis", share=0.9, torque_ripple=TorqueRipple(*AMPLITUDES, PERIOD))),
@@ -248,6 +261,11 @@ CASES: dict[str, Case] = {
         axis(FrictionElement(LAW, warm_up=WARM)),
         MOVING,
         one_mass(lambda t, q, v: command(t) - (0.1 + 0.02 * v) * warmth(t)),
+    ),
+    "warm-up of viscous friction": Case(
+        axis(FrictionElement(LAW, warm_up=replace(WARM, viscous_excess=-0.4))),
+        MOVING,
+        one_mass(lambda t, q, v: command(t) - 0.1 * warmth(t) - 0.02 * v * (warmth(t) - 0.4 * risen(t))),
     ),
     "warm-up and ripple, polyline": Case(
         axis(FrictionElement(Polyline(0.1, (0.02,)), ripple=Ripple(*AMPLITUDES, PERIOD), warm_up=WARM)),

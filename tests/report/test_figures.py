@@ -34,6 +34,7 @@ def test_every_figure_is_written_as_png_and_svg(written: list[Path]) -> None:
             assert content.startswith(b"\x89PNG")
         else:
             assert ElementTree.fromstring(content).tag.endswith("svg")
+            assert b"mathdefault" not in content, "a tick of a logarithmic axis shows its formula"
 
 
 def test_names_cannot_leave_the_folder_nor_meet_in_one_file() -> None:
