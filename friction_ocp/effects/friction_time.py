@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.friction.composite import plain_law, viscous_part
 from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
@@ -15,7 +16,10 @@ from friction_ocp.parameters import Free
 
 
 class WarmUpEffect(AbstractEffect):
-    """Friction drifts with time, or with the temperature where it is recorded."""
+    """Friction drifts with time, or with the temperature where it is recorded.
+
+    With time the viscous part need not drift as the dry part does: a lubricant gets thin before a contact gets smooth.
+    """
 
     name: ClassVar[str] = "warm_up"
     sentence: ClassVar[str] = "friction drifts with time or temperature"
@@ -33,18 +37,13 @@ class WarmUpEffect(AbstractEffect):
         else:
             longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
             times = [0.1 * longest, 0.3 * longest, longest]
+            sizes = {f"{path}.amplitude": -0.05}
             part = WarmUp(amplitude=Free(-0.1, -0.95, 5.0), time_constant=Free(times[1], 0.01 * longest, 100 * longest))
-            off = {f"{path}.amplitude": 0.0}
-            trials = tuple(Trial(({f"{path}.amplitude": -0.05},), {f"{path}.time_constant": one}) for one in times)
+            if is_dry(shaft) and viscous_part(shaft.friction.law) is not None:
+                part = replace(part, viscous_excess=Free(0.0, -1.0, 5.0))
+                sizes[f"{path}.viscous_excess"] = -0.05
+            off = dict.fromkeys(sizes, 0.0)
+            amplitudes = tuple({name: size} for name, size in sizes.items())
+            trials = tuple(Trial(amplitudes, {f"{path}.time_constant": one}) for one in times)
         element = replace(shaft.friction, warm_up=part)
         return Augmentation(change_shaft(drive, place, friction=element), off, trials)
-
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        element, path = drive.shaft(place).friction, f"{place}.friction.warm_up.viscous_excess"
-        drift = element.warm_up
-        if drift is None or not isinstance(drift.amplitude, Free) or drift.viscous_excess is not None:
-            return None
-        if viscous_part(element.law) is None:
-            return None
-        changed = replace(element, warm_up=replace(drift, viscous_excess=Free(-0.1, -5.0, 5.0)))
-        return Augmentation(change_shaft(drive, place, friction=changed), {path: 0.0}, (Trial(({path: -0.05},)),))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from diagnosis_cases import COULOMB, TORQUE_CONSTANT, axis, write_case
-from plant import Plant, PlantRipple, PlantWarmUp
+from plant import Plant, PlantRipple
 
 from friction_ocp.cli import main
 
@@ -23,12 +23,6 @@ def cogging() -> Plant:
     """Return an axis whose cogging has overtones."""
     plain = axis()
     return replace(plain, motors=(replace(plain.motors[0], cogging=PlantRipple(3.1, COSINES, SINES)),))
-
-
-def warming() -> Plant:
-    """Return an axis whose viscous friction falls by most of it, its dry friction by little."""
-    plain = axis()
-    return replace(plain, shafts=(replace(plain.shafts[0], warm_up=PlantWarmUp(2.0, -0.1, -0.8, 0.0)),))
 
 
 def diagnosed(folder: Path, plant: Plant, effects: list[str]) -> dict[str, Any]:
@@ -66,11 +60,3 @@ def test_overtones_belong_to_their_wave(tmp_path: Path) -> None:
     sizes = [np.hypot(found[f"{order}cosine"], found[f"{order}sine"]) for order in ("", "second_", "third_")]
     assert sizes == pytest.approx(np.hypot(COSINES, SINES), rel=0.1)
     assert max(sizes) < TORQUE_CONSTANT
-
-
-@pytest.mark.slow
-def test_viscous_friction_may_warm_up_more(tmp_path: Path) -> None:
-    """Dry and viscous friction need not fall alike."""
-    found = values_of(diagnosed(tmp_path, warming(), ["warm_up", "quadratic_drag"]))
-    assert found["amplitude"] == pytest.approx(-0.1, abs=0.03)
-    assert found["amplitude"] + found["viscous_excess"] == pytest.approx(-0.8, rel=0.1)
