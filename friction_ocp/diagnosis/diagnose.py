@@ -199,6 +199,8 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             keys = [*accepted, done.accepted.key]
             current, accepted = _reexamined(base, done.accepted.fitted, keys, level, rng)
             bench = bench.at(current)
+            if not innovations(current).significant(level):
+                break
     current, checked = _checked(bench.current, level)
     rounds += checked
     accepted += [item.accepted.key for item in checked if item.accepted is not None]

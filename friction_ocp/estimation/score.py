@@ -70,6 +70,10 @@ def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Progra
     return program.point_along(smoother, solved)
 
 
+NOTHING, RELATIVE = 1e-3, 1e-9
+"""Decrease of the objective below which a step gained nothing: in units of log-likelihood, and of the objective."""
+
+
 def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
     """Solve for the node states with the parameters held."""
     if program.without_nodes:
@@ -80,11 +84,14 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
         steps = reduce_system(system, damping).node_steps(still)
         trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))
         after = program.objective(trial)
+        nothing = max(NOTHING, RELATIVE * objective)
         if not after < objective:
+            if after - objective < nothing:
+                break  # at a kink, or at the end
             damping *= 100.0
             continue
         gained, point, objective = objective - after, trial, after
-        if gained < 1e-9 * objective:
+        if gained < nothing:
             break
         system, damping = program.linearise(point), 0.1 * damping
     return point
