@@ -84,9 +84,13 @@ COMMANDS = {
     "bootstrap": ["--draws", "20", "--workers", "1"],
     "profile": ["--parameter", "motor.inertia", "--workers", "1"],
 }
+QUICK = ("simulate", "multistart")
+"""Those that every run of the tests repeats."""
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COMMANDS]
+)
 def test_other_results_are_made_again_with_their_options(command: str, made: Path, tmp_path: Path) -> None:
     """The command and its options are in the result."""
     assert main([command, str(made / "axis.yaml"), "--out", str(tmp_path / "out"), *COMMANDS[command]]) == DONE

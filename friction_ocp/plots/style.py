@@ -35,7 +35,6 @@ _RC: dict[str, Any] = {
     "axes.titleweight": "bold",
     "axes.xmargin": 0.01,
     "figure.constrained_layout.h_pad": 0.06,
-    "figure.constrained_layout.use": True,
     "figure.dpi": 150,
     "figure.facecolor": "white",
     "font.family": ["DejaVu Sans"],
@@ -73,7 +72,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure of this size in inches, without pyplot and its global state."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height))
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> list[list[Axes]]:
@@ -84,24 +83,30 @@ def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> li
 
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure as PNG and SVG, each whole or not at all, without a date: equal results give equal files."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
+    _lay_out(figure)
     paths: list[Path] = []
     for ending, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = stem.with_name(f"{stem.name}.{ending}")
         with whole_file(path) as staged:
             figure.savefig(staged, format=ending, metadata=metadata)
-        figure.set_layout_engine("none")  # laid out once, for both files
         paths.append(path)
     return paths
 
 
 def svg_text(figure: Figure) -> str:
     """Return a figure as an SVG document, the same for equal figures."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
+    _lay_out(figure)
     written = io.StringIO()
     figure.savefig(written, format="svg", metadata={"Date": None})
     return written.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Place the axes of a figure for good: matplotlib would do it again, and draw all of it for that, in every file."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    engine = figure.get_layout_engine()
+    if engine is not None and figure.axes:
+        engine.execute(figure)
+    figure.set_layout_engine(None)

@@ -89,6 +89,7 @@ def test_a_model_that_lacks_nothing_has_no_gap(tmp_path: Path) -> None:
     assert result["accepted"] == [] and result["biased_parameters"] == []
 
 
+@pytest.mark.slow
 def test_what_does_not_carry_over_explains_nothing(tmp_path: Path) -> None:
     """Where the recording left out is of a drive without the effect, adding it shrinks no gap there."""
     path = write_case(tmp_path, axis(**STRIBECK))

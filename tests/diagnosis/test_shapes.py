@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,48 @@ from diagnosis_cases import COULOMB, TORQUE_CONSTANT, axis, write_case
 from plant import Plant, PlantRipple
 
 from friction_ocp.cli import main
+from friction_ocp.drive.parts import (
+    Channel,
+    Cogging,
+    Disturbance,
+    Drive,
+    KinematicError,
+    Motor,
+    Shaft,
+    TorqueRipple,
+    Transmission,
+)
+from friction_ocp.drive.stepping import stepped
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.effects.effect import Clues
+from friction_ocp.effects.registry import effects
+from friction_ocp.friction.composite import AddedFriction, StribeckRise, Sum
+from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.modifiers import Ripple
+from friction_ocp.friction.static import CoulombViscous
 
 EXPONENT = 0.8
+LAW = CoulombViscous(0.1, 0.02)
+RISING = Sum(LAW, AddedFriction(stribeck=StribeckRise(0.1, 3.0, 2.0)))
+
+
+def geared(law: FrictionElement = FrictionElement(LAW), wave: Disturbance | None = None, **motor: Any) -> Drive:
+    """Return a motor and a load on an elastic gear whose ratio ripples."""
+    gear = Transmission("motor", "load", 5.0, 800.0, 2.0, kinematic_error=KinematicError(0.01, 0.02, 0.9))
+    channels = (Channel("torque", "drive.torque", "input"), Channel("theta", "motor.theta"))
+    shafts = (Shaft("motor", 0.02, law, disturbance=wave), Shaft("load", 0.5))
+    return Drive(shafts, (gear,), (Motor("drive", "motor", **motor),), None, channels)
+
+
+SHAPES: dict[str, tuple[Drive, str]] = {
+    "stribeck": (geared(FrictionElement(RISING)), "motor"),
+    "position_ripple": (geared(FrictionElement(LAW, ripple=Ripple(0.2, 0.1, 0.7))), "motor"),
+    "cogging": (geared(cogging=Cogging(0.05, 0.08, 0.7)), "motor"),
+    "torque_ripple": (geared(torque_ripple=TorqueRipple(0.1, 0.2, 0.7)), "motor"),
+    "periodic_disturbance": (geared(wave=Disturbance(0.1, 0.05, 0.3)), "motor"),
+    "kinematic_error": (geared(), "motor-load"),
+}
+"""A drive that has the effect already, and where."""
 COSINES, SINES = (0.03, 0.0, 0.006), (0.0, -0.012, 0.0)
 
 
@@ -44,6 +85,41 @@ def values_of(result: dict[str, Any]) -> dict[str, float]:
     return {name.rpartition(".")[2]: item["value"] for name, item in accepted["parameters"].items()}
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_begins_as_what_it_was(name: str) -> None:
+    """At its off values the drive is the one it was, at others it is not; and there is one more general shape."""
+    (drive, place), effect, clues = SHAPES[name], effects()[name], Clues((), {}, {})
+    found = effect.reshaped(drive, place, clues)
+    assert found is not None and effect.addition(drive, place, clues) == found
+    assert effect.reshaped(found.drive, place, clues) is None
+    assert set(found.off) == {path for trial in found.trials for grown in trial.amplitudes for path in grown}
+    plain, off = moved(drive, {}), moved(found.drive, found.off)
+    assert off == pytest.approx(plain, rel=1e-12)
+    sizes = [1.0] * len(found.trials[0].amplitudes)
+    assert moved(found.drive, found.trials[0].values(found.off, sizes)) != pytest.approx(plain, rel=1e-9)
+
+
+def test_other_effects_keep_their_shape() -> None:
+    """An effect without a more general shape, or that the drive does not have, is added as the catalogue gives it."""
+    drive, clues = geared(), Clues((), {}, {"motor": 0.1})
+    names = [name for name, (_, place) in SHAPES.items() if place == "motor"]
+    assert [name for name in names if effects()[name].reshaped(drive, "motor", clues) is not None] == []
+    added = effects()["constant_torque"].addition(drive, "motor", clues).drive
+    assert added.shaft("motor").external_torque is not None
+
+
+def moved(drive: Drive, values: Mapping[str, float]) -> list[float]:
+    """Return the state a step after some state in motion."""
+    made = stepped(drive)
+    numbers = {leaf.path: leaf.value for leaf in drive_leaves(drive)} | dict(values)
+    at = [1.3, 0.2, 2.0, 0.5][: len(made.state_names)]
+    after = made.step(
+        at, [0.4, 0.13, 0.13][: len(made.input_names)], [numbers[name] for name in made.parameter_names], 1e-3, 0
+    )
+    return [float(item) for item in np.ravel(np.asarray(after))]
+
+
+@pytest.mark.slow
 def test_the_exponent_of_a_stribeck_curve_is_found(tmp_path: Path) -> None:
     """Friction that falls more pointedly than a bell is Stribeck friction all the same."""
     plant = axis(law="stribeck", tau_s=2.0 * COULOMB, omega_s=6.0, delta=EXPONENT)

@@ -139,6 +139,7 @@ def at_answer(item: Problem, theta: np.ndarray) -> Survey:
     return found
 
 
+@pytest.mark.slow
 def test_a_channel_that_is_recommended_tells_what_it_promised() -> None:
     """Motor and load friction seen from the motor alone trade; the fit confirms what a load encoder gains."""
     item = elastic_problem()

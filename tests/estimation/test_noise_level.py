@@ -105,6 +105,7 @@ def test_torque_noise_of_a_shaft_is_found(seed: int) -> None:
     assert told["interval95"][0] < told["value"] < told["interval95"][1]
 
 
+@pytest.mark.slow
 def test_noise_of_two_shafts_is_told_apart() -> None:
     """With an encoder on each shaft both levels are found, their errors inside the joint 99.9 % region."""
     estimate = identify(two_masses(3))

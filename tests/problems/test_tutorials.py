@@ -49,6 +49,7 @@ def test_a_tutorial_reads_as_cells(name: str) -> None:
     assert f"(problems/tutorials/{name}.py)" in README
 
 
+@pytest.mark.slow
 def test_a_first_identification(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The answer is nearer to the machine than the guesses, and every parameter is told."""
     names = run("first_identification", tmp_path, monkeypatch)
