@@ -51,8 +51,9 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     asked = {name: [str(problem)] for name in COMMANDS}
     asked["compare"] = [str(problem), str(other)]
     asked["batch"] = [str(problem), str(folder / "nights")]
+    plant = axis(law="stribeck", tau_s=0.15, omega_s=6.0)
     asked["diagnose"] = asked["design"] = [
-        str(write_case(folder / "lacking", axis(law="stribeck", tau_s=0.15, omega_s=6.0)))
+        str(write_case(folder / "lacking", plant, effects=("stribeck", "quadratic_drag")))
     ]
     for name, options in COMMANDS.items():
         assert main([name, *asked[name], *options, "--out", str(folder / name)]) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,11 @@ def record(plant: Plant, name: str, seed: int) -> Recording:
     return Recording(name, {key: Channel(key, *run.channels[key], units[key]) for key in units})
 
 
-def write_case(folder: Path, plant: Plant, seed: int = 1) -> Path:
+EFFECTS = ("stribeck", "quadratic_drag", "asymmetry", "unbalance", "sensor_delay")
+"""That compete in a problem unless another catalogue is asked for."""
+
+
+def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str] = EFFECTS) -> Path:
     """Write three recordings and a problem whose model has Coulomb and viscous friction alone."""
     for k, name in enumerate("abc"):
         write_recording(record(plant, name, 10 * seed + k), folder / f"{name}.h5")
@@ -65,7 +70,7 @@ def write_case(folder: Path, plant: Plant, seed: int = 1) -> Path:
             "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
         },
         "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
-        "diagnosis": {"effects": ["stribeck", "quadratic_drag", "asymmetry", "unbalance", "sensor_delay"]},
+        "diagnosis": {"effects": list(effects)},
     }
     path = folder / "problem.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")

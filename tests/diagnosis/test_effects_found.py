@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from diagnosis_cases import COULOMB, TORQUE_CONSTANT, VISCOUS, axis, write_case
 from plant import Plant, PlantAmplifier, PlantFriction, PlantRipple, PlantSaturation, PlantWarmUp
 
@@ -56,17 +55,13 @@ CASES: dict[str, tuple[Callable[[], Plant], str, tuple[str, ...]]] = {
     "periodic_disturbance": (shaft(disturbance=PlantRipple(0.9, (0.1 * TORQUE,), (0.0,))), "motor", ("cogging",)),
     "sensor_delay": (sensor(delay=0.005), "position", ("drive_lag", "quadratic_drag")),
 }
-QUICK = ("quadratic_drag",)
-"""Those that every run of the tests tries."""
 
 
-@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in CASES])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
 def test_what_the_plant_has_is_named(name: str, tmp_path: Path) -> None:
     """The effect is accepted at its place, by itself or at the head of an alias set, and nothing before it."""
     plant, place, rivals = CASES[name]
-    path = write_case(tmp_path, plant())
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["diagnosis"]["effects"] = [name, *rivals]
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    path = write_case(tmp_path, plant(), effects=[name, *rivals])
     found = diagnose(load_problem(path))
     assert found.accepted[:1] == ((name, place),)

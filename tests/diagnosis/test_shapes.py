@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from diagnosis_cases import COULOMB, TORQUE_CONSTANT, axis, write_case
 from plant import Plant, PlantRipple
 
@@ -68,10 +67,7 @@ def cogging() -> Plant:
 
 def diagnosed(folder: Path, plant: Plant, effects: list[str]) -> dict[str, Any]:
     """Return the result document of a diagnosis with a narrow catalogue."""
-    path = write_case(folder, plant)
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["diagnosis"]["effects"] = effects
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    path = write_case(folder, plant, effects=effects)
     assert main(["diagnose", str(path), "--out", str(folder / "out")]) == 0
     return json.loads((folder / "out" / "result.json").read_text(encoding="utf-8"))
 
