@@ -152,8 +152,8 @@ def _aries_model(left_out: str, numbers: Mapping[str, float]) -> Document:
         law = {key: value for key, value in law.items() if not key.startswith("sigma")}
         law |= {"law": "stribeck", "viscous": guessed(numbers["viscous"])}
     if left_out == "stribeck":
-        law = {"law": "dahl", "sigma0": guessed(numbers["sigma0"]), "sigma1": guessed(numbers["sigma1"])}
-        law |= {"tau_c": guessed(numbers["tau_c"]), "sigma2": guessed(numbers["viscous"])}
+        law = {"law": "coulomb_viscous", **{key: guessed(numbers[key]) for key in ("tau_c", "viscous")}}
+        law["bristle"] = {key: guessed(numbers[key]) for key in ("sigma0", "sigma1")}
     return {
         "drive": {
             "motor": {"name": "motor", "torque_constant": 1},
