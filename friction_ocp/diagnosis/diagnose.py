@@ -23,9 +23,8 @@ from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.diagnosis.worth import (
     Key,
-    gain,
+    Standard,
     innovations,
-    is_material,
     places,
     required,
     shapes,
@@ -294,12 +293,9 @@ def _round(
     hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
     gap = power.significant(level)
     chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-    choice = choose([], blocks, level, rng)
+    choice, standard = choose([], blocks, level, rng), Standard(current, enough)
     for rivals in _completed(crew, chosen):
-        able = [
-            item.key in again or (gain(current, item) >= enough and is_material(current, item.fitted))
-            for item in rivals
-        ]
+        able = [item.key in again or standard.met_by(item) for item in rivals]
         choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
         choice = with_refused(choice, tuple(item for item, yes in zip(rivals, able, strict=True) if not yes))
         if choice.significant or not gap:

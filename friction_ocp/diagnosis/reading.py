@@ -71,7 +71,10 @@ def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
     """
     drive, clues = base.model.problem.drive, clues_of(base)
     for effect, place in keys:
-        shape = effects()[effect].reshaped(drive, place, clues)
-        if shape is not None or place in {*effects()[effect].places(drive), *drive.prescribed}:
-            drive = effects()[effect].addition(drive, place, clues).drive
+        kind = effects()[effect]
+        shape = kind.reshaped(drive, place, clues)
+        if shape is not None:
+            drive = shape.drive
+        elif place in {*kind.places(drive), *drive.prescribed}:
+            drive = kind.augment(drive, place, clues).drive
     return drive

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.free_gap import free_errors
+from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Rival
 from friction_ocp.effects.effect import Clues
@@ -82,19 +83,39 @@ def gain(current: FittedModel, rival: Rival) -> float:
     return min(float(np.sum(rival.gains)), current.cost - rival.fitted.cost)
 
 
-def is_material(current: FittedModel, fitted: FittedModel) -> bool:
-    """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
+@dataclass(frozen=True)
+class Standard:
+    """What an addition to a model is measured by; what that model itself leaves is looked at once, if at all."""
 
-    Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost they
-    show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where most of
-    what they have beyond noise goes.
-    """
-    before, after = free_errors(current, held_out=False), free_errors(fitted, held_out=False)
-    pairs = [(before.excess(), after.excess()), (_static_excess(current), _static_excess(fitted))]
-    one_step = (innovations(current).beyond, innovations(fitted).beyond)
-    if one_step[1] < 0.5 * one_step[0] or (before.lost and after.excess() <= before.excess()):
-        pairs.append(one_step)
-    return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
+    current: FittedModel
+    enough: float
+    """Decrease of the objective that makes an addition an effect of its own."""
+
+    @cached_property
+    def _before(self) -> FreeErrors:
+        return free_errors(self.current, held_out=False)
+
+    @cached_property
+    def _beyond(self) -> float:
+        return innovations(self.current).beyond
+
+    def met_by(self, rival: Rival) -> bool:
+        """Whether a rival gains enough and matters."""
+        return gain(self.current, rival) >= self.enough and self.is_material(rival.fitted)
+
+    def is_material(self, fitted: FittedModel) -> bool:
+        """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
+
+        Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
+        they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
+        most of what they have beyond noise goes.
+        """
+        before, after = self._before, free_errors(fitted, held_out=False)
+        pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
+        one_step = (self._beyond, innovations(fitted).beyond)
+        if one_step[1] < 0.5 * one_step[0] or (before.lost and after.excess() <= before.excess()):
+            pairs.append(one_step)
+        return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
 
 
 def innovations(fitted: FittedModel) -> Excess:

@@ -36,7 +36,7 @@ def input_symbols(drive: Drive, structure: Topology) -> dict[str, ca.SX]:
 
 def _derivatives(channel: Channel, drive: Drive, structure: Topology) -> int:
     """Return how many time derivatives of an input the drive needs: a speed, and an acceleration where it is seen."""
-    if channel.part not in structure.group_of or channel.signal not in ("theta", "omega"):
+    if channel not in drive.prescribing:
         return 0
     accelerated = structure.group_of[channel.part] in _seen_groups(drive, structure)
     return (channel.signal == "theta") + accelerated
@@ -77,9 +77,8 @@ def warm_up_faults(drive: Drive) -> Iterator[Finding]:
 
 def moved_from_behind(drive: Drive, structure: Topology) -> Iterator[Finding]:
     """Yield the inputs that prescribe the motion of a shaft behind a rigid joint with a kinematic error."""
-    for channel in drive.inputs:
-        joints = structure.path.get(channel.part, ())
-        if channel.signal in ("theta", "omega") and any(joint.kinematic_error is not None for joint, _ in joints):
+    for channel in drive.prescribing:
+        if any(joint.kinematic_error is not None for joint, _ in structure.path[channel.part]):
             root = structure.roots[structure.group_of[channel.part]]
             what = f"{channel.measures} is prescribed behind a rigid joint with a kinematic error"
             yield Finding(f"channels.{channel.name}", what, f"{root}.{channel.signal}", "or state a stiffness")

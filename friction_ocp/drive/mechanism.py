@@ -268,11 +268,7 @@ def mechanism(drive: Drive) -> Mechanism:
     parameters = {leaf.path: symbol(leaf.path) for leaf in drive_leaves(live)}
     bound = bind_drive(live, parameters)
     structure = topology(bound)
-    prescribed = {
-        structure.group_of[channel.part]: channel.signal
-        for channel in drive.inputs
-        if channel.part in structure.group_of and channel.signal in ("theta", "omega")
-    }
+    prescribed = {structure.group_of[channel.part]: channel.signal for channel in drive.prescribing}
     if findings := list(moved_from_behind(live, structure)):
         raise FrictionOcpError(findings)
     return Mechanism(bound, structure, parameters, input_symbols(live, structure), prescribed)

@@ -37,46 +37,26 @@ class ExternalTorque:
 
 
 @dataclass(frozen=True)
-class Disturbance(Wave):
+class Disturbance(Wave, kind="torque", of="the external torque", over="time", period="the external torque"):
     """An external torque periodic in the time since the start of the recording."""
 
-    cosine: Value = quantity("torque", "cosine part of the external torque")
-    sine: Value = quantity("torque", "sine part of the external torque")
-    period: Value = quantity("time", "period of the external torque", nested="guess")
-    second_cosine: Value = quantity("torque", "cosine part of the second order of the external torque", None)
-    second_sine: Value = quantity("torque", "sine part of the second order of the external torque", None)
-    third_cosine: Value = quantity("torque", "cosine part of the third order of the external torque", None)
-    third_sine: Value = quantity("torque", "sine part of the third order of the external torque", None)
-
 
 @dataclass(frozen=True)
-class Cogging(Wave):
+class Cogging(
+    Wave, kind="torque", of="the cogging torque", over="angle", period="the cogging torque over the shaft's angle"
+):
     """A torque on the motor's shaft periodic in its angle, whether or not there is current."""
 
-    cosine: Value = quantity("torque", "cosine part of the cogging torque")
-    sine: Value = quantity("torque", "sine part of the cogging torque")
-    period: Value = quantity("angle", "period of the cogging torque over the shaft's angle", nested="guess")
-    second_cosine: Value = quantity("torque", "cosine part of the second order of the cogging torque", None)
-    second_sine: Value = quantity("torque", "sine part of the second order of the cogging torque", None)
-    third_cosine: Value = quantity("torque", "cosine part of the third order of the cogging torque", None)
-    third_sine: Value = quantity("torque", "sine part of the third order of the cogging torque", None)
-
 
 @dataclass(frozen=True)
-class TorqueRipple(Wave):
+class TorqueRipple(
+    Wave,
+    kind="dimensionless",
+    of="the relative torque ripple",
+    over="angle",
+    period="the torque ripple over the shaft's angle",
+):
     """Torque of the motor times 1 + a wave over its shaft's angle."""
-
-    cosine: Value = quantity("dimensionless", "cosine part of the relative torque ripple")
-    sine: Value = quantity("dimensionless", "sine part of the relative torque ripple")
-    period: Value = quantity("angle", "period of the torque ripple over the shaft's angle", nested="guess")
-    second_cosine: Value = quantity(
-        "dimensionless", "cosine part of the second order of the relative torque ripple", None
-    )
-    second_sine: Value = quantity("dimensionless", "sine part of the second order of the relative torque ripple", None)
-    third_cosine: Value = quantity(
-        "dimensionless", "cosine part of the third order of the relative torque ripple", None
-    )
-    third_sine: Value = quantity("dimensionless", "sine part of the third order of the relative torque ripple", None)
 
 
 @dataclass(frozen=True)
@@ -140,16 +120,10 @@ class Hysteresis:
 
 
 @dataclass(frozen=True)
-class KinematicError(Wave):
+class KinematicError(
+    Wave, kind="angle", of="the kinematic error", over="input_angle", period="the kinematic error over the input angle"
+):
     """Angle by which the output side is ahead of the ratio, periodic in the angle of the input shaft."""
-
-    cosine: Value = quantity("angle", "cosine part of the kinematic error")
-    sine: Value = quantity("angle", "sine part of the kinematic error")
-    period: Value = quantity("input_angle", "period of the kinematic error over the input angle", nested="guess")
-    second_cosine: Value = quantity("angle", "cosine part of the second order of the kinematic error", None)
-    second_sine: Value = quantity("angle", "sine part of the second order of the kinematic error", None)
-    third_cosine: Value = quantity("angle", "cosine part of the third order of the kinematic error", None)
-    third_sine: Value = quantity("angle", "sine part of the third order of the kinematic error", None)
 
 
 @dataclass(frozen=True)
@@ -293,10 +267,15 @@ class Drive:
         return next((clock for clock in self.clocks if clock.name == channel.clock), None)
 
     @property
+    def prescribing(self) -> tuple[Channel, ...]:
+        """The inputs that prescribe the motion of a shaft."""
+        shafts = {shaft.name for shaft in self.shafts}
+        return tuple(item for item in self.inputs if item.part in shafts and item.signal in ("theta", "omega"))
+
+    @property
     def prescribed(self) -> frozenset[str]:
         """The shafts whose motion is an input."""
-        parts = {channel.part for channel in self.inputs if channel.signal in ("theta", "omega")}
-        return frozenset(shaft.name for shaft in self.shafts if shaft.name in parts)
+        return frozenset(channel.part for channel in self.prescribing)
 
     @property
     def inputs(self) -> tuple[Channel, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from friction_ocp.effects.effect import (
     transmission,
     upwards,
 )
-from friction_ocp.effects.periodic import overtones, wave
+from friction_ocp.effects.periodic import AbstractWaveEffect
+from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, is_off
 
 
@@ -112,27 +113,25 @@ class TransmissionHysteresisEffect(AbstractEffect):
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)
 
 
-class KinematicErrorEffect(AbstractEffect):
+class KinematicErrorEffect(AbstractWaveEffect):
     """The ratio ripples with the angle."""
 
     name: ClassVar[str] = "kinematic_error"
     sentence: ClassVar[str] = "the ratio ripples with the angle of the input shaft"
+    kind: ClassVar[type[Wave]] = KinematicError
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in drive.transmissions if not item.rigid and item.kinematic_error is None]
 
-    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        return transmission(drive, place).kinematic_error, f"{place}.kinematic_error"
+
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_transmission(drive, place, kinematic_error=part)
+
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         item = transmission(drive, place)
         _, twist = _twist(drive, item, clues)
         found = [*clues.periods(item.from_shaft, "theta")[:2], *clues.periods(item.to_shaft, "theta")[:2]]
         ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
-        periods = [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
-        part, off, trials = wave(KinematicError, f"{place}.kinematic_error", 0.1 * twist, periods)
-        return Augmentation(change_transmission(drive, place, kinematic_error=part), off, trials)
-
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        error = transmission(drive, place).kinematic_error
-        if error is None or error.has_overtones:
-            return None
-        part, off, trials = overtones(error, f"{place}.kinematic_error", clues)
-        return Augmentation(change_transmission(drive, place, kinematic_error=part), off, trials)
+        return 0.1 * twist, [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]

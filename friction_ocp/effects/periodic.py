@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -24,6 +25,7 @@ from friction_ocp.effects.effect import (
 )
 from friction_ocp.effects.friction_curve import SHARE, is_dry
 from friction_ocp.friction.modifiers import Ripple
+from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free
 
 
@@ -52,26 +54,53 @@ def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float]
     return replace(part, **dict.fromkeys(names, either_way(size))), dict.fromkeys(paths, 0.0), (trial,)
 
 
-class PositionRippleEffect(AbstractEffect):
+class AbstractWaveEffect(AbstractEffect):
+    """A wave that a part of the drive lacks, with overtones once one with a single period was accepted."""
+
+    kind: ClassVar[type[Wave]]
+
+    @abstractmethod
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        """Return the wave at a place, None where there is none, and the path of its numbers."""
+
+    @abstractmethod
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        """Return the drive with a wave at a place."""
+
+    @abstractmethod
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+        """Return the size of a trial and the periods that are tried."""
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        part, off, trials = wave(self.kind, self.there(drive, place)[1], *self.size_and_periods(drive, place, clues))
+        return Augmentation(self.with_wave(drive, place, part), off, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        plain, path = self.there(drive, place)
+        if plain is None or plain.has_overtones:
+            return None
+        part, off, trials = overtones(plain, path, clues)
+        return Augmentation(self.with_wave(drive, place, part), off, trials)
+
+
+class PositionRippleEffect(AbstractWaveEffect):
     """Friction varies with the angle."""
 
     name: ClassVar[str] = "position_ripple"
     sentence: ClassVar[str] = "friction varies with the angle"
+    kind: ClassVar[type[Wave]] = Ripple
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in moving_shafts(drive) if is_dry(item) and item.friction.ripple is None]
 
-    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        path, element = f"{place}.friction.ripple", drive.shaft(place).friction
-        part, off, trials = wave(Ripple, path, SHARE, clues.periods(place, "theta", against_motion=True))
-        return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        return drive.shaft(place).friction.ripple, f"{place}.friction.ripple"
 
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        element = drive.shaft(place).friction
-        if element.ripple is None or element.ripple.has_overtones:
-            return None
-        part, off, trials = overtones(element.ripple, f"{place}.friction.ripple", clues)
-        return Augmentation(change_shaft(drive, place, friction=replace(element, ripple=part)), off, trials)
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_shaft(drive, place, friction=replace(drive.shaft(place).friction, ripple=part))
+
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+        return SHARE, clues.periods(place, "theta", against_motion=True)
 
 
 def _driven(drive: Drive) -> dict[str, Motor]:
@@ -80,74 +109,72 @@ def _driven(drive: Drive) -> dict[str, Motor]:
     return {shaft.name: motors[shaft.name] for shaft in moving_shafts(drive) if shaft.name in motors}
 
 
-class CoggingEffect(AbstractEffect):
+def _motor_at(drive: Drive, shaft: str) -> Motor:
+    motor = motor_of(drive, shaft)
+    assert motor is not None
+    return motor
+
+
+class CoggingEffect(AbstractWaveEffect):
     """Torque periodic in the motor angle."""
 
     name: ClassVar[str] = "cogging"
     sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
+    kind: ClassVar[type[Wave]] = Cogging
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [name for name, motor in _driven(drive).items() if motor.cogging is None]
 
-    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        motor = motor_of(drive, place)
-        assert motor is not None
-        size, periods = SHARE * clues.typical_torque[place], clues.periods(place, "theta")
-        part, off, trials = wave(Cogging, f"{motor.name}.cogging", size, periods)
-        return Augmentation(change_motor(drive, motor.name, cogging=part), off, trials)
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        motor = _motor_at(drive, place)
+        return motor.cogging, f"{motor.name}.cogging"
 
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        motor = motor_of(drive, place)
-        if motor is None or motor.cogging is None or motor.cogging.has_overtones:
-            return None
-        part, off, trials = overtones(motor.cogging, f"{motor.name}.cogging", clues)
-        return Augmentation(change_motor(drive, motor.name, cogging=part), off, trials)
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_motor(drive, _motor_at(drive, place).name, cogging=part)
+
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+        return SHARE * clues.typical_torque[place], clues.periods(place, "theta")
 
 
-class TorqueRippleEffect(AbstractEffect):
+class TorqueRippleEffect(AbstractWaveEffect):
     """Torque periodic in the motor angle and proportional to current."""
 
     name: ClassVar[str] = "torque_ripple"
     sentence: ClassVar[str] = "the motor's torque ripples with its angle, in proportion to the current"
+    kind: ClassVar[type[Wave]] = TorqueRipple
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [name for name, motor in _driven(drive).items() if motor.torque_ripple is None]
 
-    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        motor = motor_of(drive, place)
-        assert motor is not None
-        periods = clues.periods(place, "theta", against_torque=motor.name)
-        part, off, trials = wave(TorqueRipple, f"{motor.name}.torque_ripple", SHARE, periods)
-        return Augmentation(change_motor(drive, motor.name, torque_ripple=part), off, trials)
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        motor = _motor_at(drive, place)
+        return motor.torque_ripple, f"{motor.name}.torque_ripple"
 
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        motor = motor_of(drive, place)
-        if motor is None or motor.torque_ripple is None or motor.torque_ripple.has_overtones:
-            return None
-        part, off, trials = overtones(motor.torque_ripple, f"{motor.name}.torque_ripple", clues)
-        return Augmentation(change_motor(drive, motor.name, torque_ripple=part), off, trials)
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_motor(drive, _motor_at(drive, place).name, torque_ripple=part)
+
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+        return SHARE, clues.periods(place, "theta", against_torque=_motor_at(drive, place).name)
 
 
-class PeriodicDisturbanceEffect(AbstractEffect):
+class PeriodicDisturbanceEffect(AbstractWaveEffect):
     """External torque periodic in time."""
 
     name: ClassVar[str] = "periodic_disturbance"
     sentence: ClassVar[str] = "an external torque periodic in time"
+    kind: ClassVar[type[Wave]] = Disturbance
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in moving_shafts(drive) if item.disturbance is None]
 
-    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        path, size = f"{place}.disturbance", SHARE * clues.typical_torque[place]
-        part, off, trials = wave(Disturbance, path, size, clues.periods(place, "time"))
-        return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        return drive.shaft(place).disturbance, f"{place}.disturbance"
 
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        wave_there = drive.shaft(place).disturbance
-        if wave_there is None or wave_there.has_overtones:
-            return None
-        part, off, trials = overtones(wave_there, f"{place}.disturbance", clues)
-        return Augmentation(change_shaft(drive, place, disturbance=part), off, trials)
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_shaft(drive, place, disturbance=part)
+
+    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+        return SHARE * clues.typical_torque[place], clues.periods(place, "time")
 
 
 LARGEST = 0.5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -106,15 +107,19 @@ def _model_inputs(
 ) -> list[InputSignal]:
     """Add the time and the derivatives of inputs that prescribe a motion, in the order of the model's inputs."""
     by_name = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
+
+    @cache
+    def smooth(name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return smooth_motion(by_name[name].time, by_name[name].values)
+
     laid: list[InputSignal] = []
     for name in drive.input_names:
         if name == TIME:
             laid.append(clock)
         elif name.endswith("'"):
-            source = by_name[name.rstrip("'")]
-            present = np.isfinite(source.values)
-            motion = smooth_motion(source.time, source.values)
-            laid.append(InputSignal(source.time[present], motion[len(name) - len(name.rstrip("'"))], False))
+            plain = name.rstrip("'")
+            source, motion = by_name[plain], smooth(plain)
+            laid.append(InputSignal(source.time[np.isfinite(source.values)], motion[len(name) - len(plain)], False))
         else:
             laid.append(by_name[name])
     return laid

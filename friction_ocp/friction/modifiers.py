@@ -25,20 +25,14 @@ class Surroundings:
 
 
 @dataclass(frozen=True)
-class Ripple(Wave):
+class Ripple(
+    Wave,
+    kind="dimensionless",
+    of="the relative change of dry friction over the angle",
+    over="angle",
+    period="the friction over the angle",
+):
     """Dry friction times 1 + a wave over the shaft's own angle."""
-
-    cosine: Value = quantity("dimensionless", "cosine part of the relative change of dry friction over the angle")
-    sine: Value = quantity("dimensionless", "sine part of the relative change of dry friction over the angle")
-    period: Value = quantity("angle", "period of the friction over the angle", nested="guess")
-    second_cosine: Value = quantity(
-        "dimensionless", "cosine part of the second order of the change of dry friction", None
-    )
-    second_sine: Value = quantity("dimensionless", "sine part of the second order of the change of dry friction", None)
-    third_cosine: Value = quantity(
-        "dimensionless", "cosine part of the third order of the change of dry friction", None
-    )
-    third_sine: Value = quantity("dimensionless", "sine part of the third order of the change of dry friction", None)
 
 
 @dataclass(frozen=True)

@@ -7,23 +7,38 @@ from dataclasses import dataclass
 from typing import Any
 
 from friction_ocp.friction.smoothing import cos, sin, sinc
-from friction_ocp.parameters import Value, is_off
+from friction_ocp.parameters import Value, is_off, quantity
 
 
 @dataclass(frozen=True)
 class Wave:
     r"""Numbers of :math:`\sum_k c_k \cos(2 \pi k x / P) + s_k \sin(2 \pi k x / P)`; who uses it says what x is.
 
-    A subclass declares the fields with their units; overtones that are None are none.
+    A subclass says what its numbers are and in which units; overtones that are None are none.
     """
 
     cosine: Value
     sine: Value
     period: Value
-    second_cosine: Value
-    second_sine: Value
-    third_cosine: Value
-    third_sine: Value
+    second_cosine: Value = None
+    second_sine: Value = None
+    third_cosine: Value = None
+    third_sine: Value = None
+
+    def __init_subclass__(cls, *, kind: str, of: str, over: str, period: str) -> None:
+        """Declare the numbers of a wave: `kind` names the unit of the parts of what it is a wave `of`.
+
+        `over` names that of its period; `period` says of what that is one.
+        """
+        parts = ("cosine", "sine")
+        numbers = {part: quantity(kind, f"{part} part of {of}") for part in parts}
+        numbers["period"] = quantity(over, f"period of {period}", nested="guess")
+        for order in ("second", "third"):
+            meaning = {part: f"{part} part of the {order} order of {of}" for part in parts}
+            numbers |= {f"{order}_{part}": quantity(kind, meaning[part], None) for part in parts}
+        cls.__annotations__ = dict.fromkeys(numbers, Value)
+        for name, number in numbers.items():
+            setattr(cls, name, number)
 
     @property
     def idle(self) -> bool:
