@@ -48,14 +48,16 @@ def formats(line: str, quick: bool) -> Check:
 
 
 def looked_at(line: str, quick: bool) -> Check:
-    """Open every page kind in a browser at both widths, and run the tutorials with their pictures.
+    """Open every page kind in a browser at both widths, and a long one; run the tutorials with their pictures.
 
     Whether a person looked is not measured; what can be is: nothing overflows, is nameless, complains or stays empty.
     """
     pages = tests_check(line, "tests/browser")
+    long = script_check(line, "pages.py")
     chosen = ("-m", "not slow") if quick else ()
     tutorials = tests_check(line, "tests/problems/test_tutorials.py", *chosen)
-    return Check(line, f"{pages.measured}\n{tutorials.measured}", bool(pages.passed and tutorials.passed))
+    told = (pages, long, tutorials)
+    return Check(line, "\n".join(check.measured for check in told), all(check.passed for check in told))
 
 
 def tests_check(line: str, *paths: str) -> Check:

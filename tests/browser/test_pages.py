@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
-from playwright.sync_api import Browser, Page, expect
-from report_example import identified
+from playwright.sync_api import Page, expect
+from report_example import SPIKE, identified, write_long_report
 from simulated_fleet import write_axis, write_fleet
 
 from friction_ocp.cli import main
@@ -26,9 +24,7 @@ COMMANDS: dict[str, list[str]] = {
     "diagnose": ["--workers", "1"],
     "design": [],
 }
-SAMPLES, MOST_BYTES, MOST_SECONDS = 1_000_000, 15_000_000, 2.0
-SPIKE = 7.5
-"""A single sample among 10^6."""
+MOST_BYTES = 15_000_000
 
 
 @pytest.fixture(scope="module")
@@ -252,32 +248,12 @@ def test_a_report_is_printed(kind: str, example: str, reports: dict[str, str], p
     assert page.locator("nav").is_visible() is False
 
 
-def long_recording(folder: Path) -> Path:
-    """Write the report of a recording of 10^6 samples with one that stands out."""
-    result, series = identified(2000)
-    time = np.arange(SAMPLES) * 1e-3
-    measured = np.sin(0.05 * time)
-    measured[654_321] = SPIKE
-    columns = {"time": time, "measured": measured, "simulated": np.sin(0.05 * time)}
-    (name, *_), channel = result["recordings"]["train"], "motor_position"
-    shown: Any = {**series, name: {**series[name], channel: columns}}
-    write_report(result, shown, folder / "report.html")
-    return folder / "report.html"
-
-
-def test_a_long_recording_keeps_its_peaks_and_opens_at_once(tmp_path: Path, browser: Browser, page: Page) -> None:
-    """10^6 samples: a file under 15 MB, the sample that stands out is drawn, and the page answers within 2 s.
-
-    The time is that of the page's own thread, so that other work on the machine does not count.
-    """
-    path = long_recording(tmp_path)
+def test_a_long_recording_keeps_its_peaks(tmp_path: Path, page: Page) -> None:
+    """10^6 samples: a file under 15 MB, and the sample that stands out is drawn."""
+    path = write_long_report(tmp_path)
     assert path.stat().st_size < MOST_BYTES
-    session = page.context.new_cdp_session(page)
-    session.send("Performance.enable", {"timeDomain": "threadTicks"})
     page.goto(path.as_uri())
     expect(page.locator(".plot .main-svg").first).to_be_visible()
-    metrics = {item["name"]: item["value"] for item in session.send("Performance.getMetrics")["metrics"]}
-    assert metrics["TaskDuration"] < MOST_SECONDS
     drawn = page.evaluate("() => Math.max(...document.querySelector('.plot').data[0].y)")
     assert drawn == pytest.approx(SPIKE)
     assert page.evaluate("() => document.querySelector('.plot').data[0].x.length") <= 4000

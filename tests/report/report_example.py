@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from friction_ocp.report import write_report
 
 Result = dict[str, Any]
 Series = dict[str, dict[str, dict[str, np.ndarray]]]
 
 CHANNELS = {"motor_position": "rad", "load_acceleration": "rad/s^2"}
 NOISE = {"motor_position": 2.0e-3, "load_acceleration": 4.0e-3}
+SPIKE = 7.5
+"""A single sample of a long recording."""
 QUESTION = """Azimuth axis of a radio telescope, 70 m dish, one of two identical drive chains.
 Known: motor inertia 0.002 kg m^2, ratio 15050, half of the structure 58355.5 kg m^2.
 Asked: Coulomb and viscous friction on both sides, stiffness and damping of the gearbox."""
@@ -196,3 +201,16 @@ def identified(samples: int = 12000) -> tuple[Result, Series]:
         },
     }
     return result, shown
+
+
+def write_long_report(folder: Path, samples: int = 1_000_000) -> Path:
+    """Write the report of a long recording with one sample that stands out."""
+    result, shown = identified(2000)
+    time = np.arange(samples) * 1e-3
+    measured = np.sin(0.05 * time)
+    measured[(2 * samples) // 3] = SPIKE
+    columns = {"time": time, "measured": measured, "simulated": np.sin(0.05 * time)}
+    (name, *_), channel = result["recordings"]["train"], "motor_position"
+    series: Any = {**shown, name: {**shown[name], channel: columns}}
+    write_report(result, series, folder / "report.html")
+    return folder / "report.html"
