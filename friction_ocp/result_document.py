@@ -265,8 +265,7 @@ def run_series(run: FreeRun, units: Mapping[str, str], state_names: tuple[str, .
         if at.any():
             # a channel keeps the nodes between its first and last sample, missing ones as NaN
             inside = slice(int(np.argmax(at)), at.size - int(np.argmax(at[::-1])))
-            channels[name] = ChannelSeries(
-                run.time[inside], run.measured[inside, column], run.simulated[inside, column], unit
-            )
+            stamps = run.time[inside] + run.late.get(name, 0.0)
+            channels[name] = ChannelSeries(stamps, run.measured[inside, column], run.simulated[inside, column], unit)
     states = {name: run.states[:, k] for k, name in enumerate(state_names)}
     return RecordingSeries(channels, StateSeries(run.time, states))

@@ -27,7 +27,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.model import Model, prepare, with_drive
+from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.execution.content import fingerprint
@@ -110,14 +110,16 @@ class Bench:
 
 
 def point_document(fitted: FittedModel) -> Json:
-    """Return parameters and node states."""
+    """Return parameters and node states, and how late channels are read."""
     point = fitted.linear.point
-    return plain({"theta": point.theta, "nodes": point.nodes})
+    return plain({"theta": point.theta, "nodes": point.nodes, "late": late_of(fitted.model)})
 
 
 def seated(model: Model, foot: Footing, content: Json) -> FittedModel:
     """Return a fit where `point_document` says that it stands."""
-    return FittedModel(model, foot, linear_program(foot.training(model), Point(**restored(content))))
+    found = restored(content)
+    model = with_late(model, found["late"])
+    return FittedModel(model, foot, linear_program(foot.training(model), Point(found["theta"], found["nodes"])))
 
 
 def footing_document(foot: Footing) -> Json:

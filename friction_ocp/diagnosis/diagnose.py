@@ -10,15 +10,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Crew, Tell, blocks_like, open_bench
-from friction_ocp.diagnosis.blocks import blocks_of
+from friction_ocp.diagnosis.bench import Crew, Tell, open_bench
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
-from friction_ocp.diagnosis.fitting import FittedModel, held_out, without_addition
+from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
-from friction_ocp.diagnosis.reading import explains_more, other_reading, with_additions
+from friction_ocp.diagnosis.reading import explains_more, other_reading
+from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, Rival, choose, resamples, shown, with_refused
+from friction_ocp.diagnosis.select import Rival, Round, choose, shown, with_refused
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.diagnosis.worth import (
@@ -43,18 +43,6 @@ FINISHED, CLOSE = 2, 1.5
 this factor."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
-
-
-@dataclass(frozen=True)
-class Round:
-    """One decision: which addition, if any."""
-
-    screened: tuple[Screened, ...]
-    """All candidates, largest predicted gain first."""
-    choice: Choice
-    before: FittedModel
-    excess: Excess
-    accepted: Rival | None
 
 
 @dataclass(frozen=True)
@@ -196,7 +184,9 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
                 break
             tell("examining earlier additions again", 0.0)
             keys = [*accepted, done.accepted.key]
-            current, accepted = _reexamined(base, done.accepted.fitted, keys, level, rng)
+            current, accepted = without_superfluous(base, done.accepted.fitted, keys, level, rng)
+            if innovations(current).significant(level):
+                current, rounds, accepted = exchanged(base, current, rounds, accepted, level, rng)
             bench = bench.at(current)
             if not innovations(current).significant(level):
                 break
@@ -233,24 +223,6 @@ def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Roun
         rounds.append(Round((), choice, current, power, choice.rivals[0]))
         current = fitted
     return current, rounds
-
-
-def _reexamined(
-    base: FittedModel, current: FittedModel, accepted: list[Key], level: float, rng: np.random.Generator
-) -> tuple[FittedModel, list[Key]]:
-    """Drop earlier additions that the latest one has made superfluous on recordings left out.
-
-    Superfluous is what neither gains for certain there nor is worth an addition in sum.
-    """
-    for key in dict.fromkeys(accepted[:-1]):
-        kept = [other for other in accepted if other != key]
-        simpler = without_addition(current, with_additions(base, kept))
-        blocks = blocks_of(current.linear.rows)
-        gains = blocks_like(current, simpler, blocks) - blocks.sums(held_out(current))
-        certain = np.quantile(resamples(blocks, rng) @ gains, level) > 0
-        if not certain and float(np.sum(gains)) < required(base, simpler):
-            current, accepted = simpler, kept
-    return current, accepted
 
 
 def considered(problem: Problem) -> list[str]:

@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
-from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.model import Model, in_time, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
 from friction_ocp.estimation.score import solve_nodes
@@ -38,6 +38,7 @@ DETOUR = 0.05
 HARDLY = (0.0005, 0.0002)
 """The same for the nodes alone: an accelerometer sees every change of the sign, and wide smoothing leads astray."""
 NODE_STEPS = 8
+MOST_TURNS = 8
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)
 STEPS_FROM_HELD_OUT = 3
 MOST_FOLDS = 4
@@ -72,14 +73,20 @@ class FittedModel:
     @property
     def objective(self) -> float:
         """The cost of all residuals: half their sum of squares, or what the loss makes of them."""
-        return self.linear.program.objective(self.linear.point)
+        return self.linear.program.objective(self.linear.point) + self._unseen
 
     @cached_property
     def cost(self) -> float:
         """The same with the noise that this model's own inertia would show: what models are compared by."""
         program, wider = with_own_noise(self.linear.program, self.model, self.footing, self.theta)
         point = solve_nodes(program, self.linear.point, STEPS_FROM_HELD_OUT)
-        return program.objective(point) + float(sum(np.sum(part) for part in wider))
+        return program.objective(point) + float(sum(np.sum(part) for part in wider)) + self._unseen
+
+    @property
+    def _unseen(self) -> float:
+        """What samples that reading late channels earlier lost count for, lest losing them looks like a gain."""
+        program = self.linear.program
+        return sum(float(np.sum(cost_of_lost(program, k))) for k in range(len(program.experiments)))
 
 
 def fit_base(model: Model) -> FittedModel:
@@ -99,7 +106,7 @@ def fit_base(model: Model) -> FittedModel:
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
     started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
-    return freed(_from_rest(started))
+    return freed(timed(_from_rest(started)))
 
 
 def _free_base(model: Model, rough: Footing) -> FittedModel:
@@ -107,7 +114,7 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
     starts = [model.space.guess, _rough_answer(model)[1].theta]
     best = min((polished(model, rough, theta, None, COARSE) for theta in starts), key=lambda end: end.objective)
     foot = footing(model, best.theta)
-    return freed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes)))
+    return freed(timed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes))))
 
 
 def _from_rest(fitted: FittedModel) -> FittedModel:
@@ -148,6 +155,16 @@ def polished(
     return FittedModel(model, foot, linear_program(program, end.point))
 
 
+def timed(fitted: FittedModel, limits: Tolerances = WARM) -> FittedModel:
+    """Fit again with late channels read as late as they were found to be, until no delay of a whole sample is left."""
+    for _ in range(MOST_TURNS):
+        nearer = in_time(fitted.model, fitted.theta)
+        if nearer is fitted.model:
+            break
+        fitted = polished(nearer, fitted.footing, fitted.theta, fitted.linear.point.nodes, limits)
+    return fitted
+
+
 def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     """Fit a candidate, a few steps from each of the starts that the score test predicts.
 
@@ -157,7 +174,7 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
     program = base.footing.training(model)
     points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
-    ends = [_steps(base, model, program, point) for point in points]
+    ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
     return min(ends, key=lambda fitted: fitted.objective)
 
 
@@ -186,7 +203,7 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 
 def completed(fitted: FittedModel) -> FittedModel:
     """Continue a refit to its end, around the kinks of exact friction that catch it."""
-    return freed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
+    return freed(timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes)))
 
 
 def freed(fitted: FittedModel) -> FittedModel:
@@ -224,7 +241,7 @@ def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
     model = with_drive(current.model, drive)
     known = current.values
     theta = np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])
-    return freed(polished(model, current.footing, theta, None))
+    return freed(timed(polished(model, current.footing, theta, None)))
 
 
 def held_out(fitted: FittedModel) -> FloatArray:
@@ -332,13 +349,19 @@ def _some(program: Program, indices: Sequence[int]) -> Program:
     )
 
 
+def cost_of_lost(program: Program, index: int) -> FloatArray:
+    """Return (n, outputs) what is to be expected of each sample that lies outside of a recording where it is read."""
+    one = program.loss.cost(np.ones(1))[0]
+    return np.where(program.experiments[index].lost, one, 0.0)
+
+
 def raw_costs(program: Program, point: Point, wider: FloatArray) -> FloatArray:
     """Return (rows,) half the squares of all residuals of a program of one recording, in the order of `Rows`.
 
     `wider` (gaps,) is what the width of a gap costs beside its residuals.
     """
     result = program.simulate(0, point)
-    samples = program.loss.cost(program.sample_errors(0, result.y))
+    samples = program.loss.cost(program.sample_errors(0, result.y)) + cost_of_lost(program, 0)
     gaps, starts = program.gap_errors(0, point, result.end), program.start_errors(0, point)
     widths = wider[:, None] / gaps.shape[1]
     return np.concatenate([samples.ravel(), (0.5 * gaps**2 + widths).ravel(), 0.5 * starts.ravel() ** 2])

@@ -107,7 +107,7 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     for begin, end in pairwise(edges):
         at = slice(begin, end + 1)
         grid = replace(item.grid, **{part.name: getattr(item.grid, part.name)[at] for part in fields(item.grid)})
-        kept = {name: getattr(item, name)[at] for name in ("measured", "smooth", "rate", "curvature")}
+        kept = {name: getattr(item, name)[at] for name in ("measured", "smooth", "rate", "curvature", "lost")}
         found.append(replace(item, grid=grid, **kept))
     return found
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks
+from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitting import FittedModel, folds
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
@@ -53,6 +54,18 @@ class Choice:
     """The best rivals: the smallest set that is sure to hold the best."""
     same: tuple[Rival, ...] = ()
     """The best rival and all that leave the same residuals."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One decision: which addition, if any."""
+
+    screened: tuple[Screened, ...]
+    """All candidates, largest predicted gain first."""
+    choice: Choice
+    before: FittedModel
+    excess: Excess
+    accepted: Rival | None
 
 
 def resamples(blocks: Blocks, rng: np.random.Generator) -> FloatArray:

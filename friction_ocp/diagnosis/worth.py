@@ -108,12 +108,12 @@ class Standard:
 
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
-        most of what they have beyond noise goes.
+        so much of what they have beyond noise goes as makes an effect of its own.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
         one_step = (self._beyond, innovations(fitted).beyond)
-        if one_step[1] < 0.5 * one_step[0] or (before.lost and after.excess() <= before.excess()):
+        if one_step[1] <= (1.0 - OF_REST) * one_step[0] or (before.lost and after.excess() <= before.excess()):
             pairs.append(one_step)
         return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
 

@@ -6,7 +6,7 @@ drift again. Order 2 on smooth motion.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -202,7 +202,7 @@ def _advance_bristles(mech: Mechanism, state: State, at: Motion, load: dict[str,
     return column(after)
 
 
-def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expression:
+def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX, late: Collection[str]) -> _Expression:
     q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
     at = _observed_lags(mech, state.at(q, v), h)
     bristle = mech.deflections(state.bristle)
@@ -210,7 +210,19 @@ def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
     done = implicit_kick(mech, Step(instant, v, at, bristle, width))
     acceleration = group_accelerations(mech, (done.v - v) / instant)
     holding = holding_torques(mech, at, acceleration, done.torques, done.friction)
-    value = column([recorded(mech, channel, at, acceleration, holding) for channel in mech.drive.outputs])
+    changing = [name for name in mech.inputs if name + "'" in mech.inputs]
+    moving = ca.vertcat(state.angles, state.speeds, column([mech.inputs[name] for name in changing]))
+    turning, speeding = pick(v, mech.angle_groups), pick(acceleration, mech.free_groups)
+    rates = ca.vertcat(turning, speeding, column([mech.inputs[name + "'"] for name in changing]))
+
+    def rate(value: Any) -> ca.SX:
+        return ca.jtimes(ca.SX(value), moving, rates)
+
+    seen = [
+        recorded(mech, channel, at, acceleration, holding, rate if channel.name in late else no_rate)
+        for channel in mech.drive.outputs
+    ]
+    value = column(seen)
     return _Expression(value, () if done.unknown is None else (done.unknown,))
 
 
@@ -232,14 +244,28 @@ def _observed_lags(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
     return replace(at, lagged=wanted + behind * (at.lagged - wanted))
 
 
-def recorded(
-    mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX, holding: Mapping[int, Any] = NOTHING_HELD
-) -> Any:
-    """Return gain * true(t - delay) + offset; the delay to second order by the motion's own derivatives.
+def no_rate(value: Any) -> Any:
+    """Return that a signal does not change."""
+    return 0.0
 
-    What a clock of its own is fast by is a delay, too. `holding` are the torques that prescribe motions, by group.
+
+def recorded(
+    mech: Mechanism,
+    channel: Channel,
+    at: Motion,
+    acceleration: ca.SX,
+    holding: Mapping[int, Any] = NOTHING_HELD,
+    rate_of: Callable[[Any], Any] = no_rate,
+) -> Any:
+    """Return gain * true(t - delay) + offset.
+
+    The delay of an angle or a speed is expanded to second order by the motion's own derivatives, that of an
+    acceleration or a torque to first order by `rate_of` it. What a clock of its own is fast by is a delay, too.
+    `holding` are the torques that prescribe motions, by group.
     """
     value, rate, curvature = _signal(mech, channel, at, acceleration, holding)
+    if channel.signal not in ("theta", "omega"):
+        rate = rate_of(value)
     delay, clock = channel.delay, mech.drive.clock_of(channel)
     if clock is not None:
         delay = delay + clock.offset + clock.drift * mech.inputs[TIME]
@@ -250,6 +276,7 @@ def recorded(
 def _signal(
     mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX, holding: Mapping[int, Any]
 ) -> tuple[Any, Any, Any]:
+    """Return the true signal, and the first two time derivatives of an angle or a speed as far as they are known."""
     if channel.signal in ("theta", "omega", "alpha"):
         theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at)
         alpha = mech.shaft_acceleration(channel.part, at, acceleration)
@@ -290,7 +317,8 @@ def stepped(drive: Drive) -> SteppedDrive:
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
     y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
-    maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width)}
+    late = {channel.name for channel in drive.outputs if channel.delay != 0.0 or channel.clock}
+    maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width, late)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
     return SteppedDrive(
         mechanism=mech,

@@ -15,6 +15,9 @@ from friction_ocp.friction.composite import Bristle, with_bristle
 from friction_ocp.friction.element import LoadDependence
 from friction_ocp.parameters import Free
 
+DAMPED, OVERDAMPED = 0.2, 100.0
+"""Damping of a bristle over that at which its shaft no longer swings on it: as it is tried, and at most."""
+
 
 class PreslidingEffect(AbstractEffect):
     """Elastic hysteresis before breakaway."""
@@ -28,16 +31,23 @@ class PreslidingEffect(AbstractEffect):
                 yield shaft.name
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        shaft, path = drive.shaft(place), f"{place}.friction.bristle.sigma0"
+        shaft, stem = drive.shaft(place), f"{place}.friction.bristle"
         breakaway = _breakaway(clues, place)
         travel = max(float(np.ptp(track.theta[place])) for track in clues.tracks)
-        shares = (1e-4, 1e-3, 1e-2, 5e-2)
-        stiffnesses = [breakaway / max(share * travel, 1e-300) for share in shares]
-        bristle = Bristle(Free(stiffnesses[1], 1e-2 * stiffnesses[-1], 1e3 * stiffnesses[0]), 0.0)
+        stiffnesses = [breakaway / max(share * travel, 1e-300) for share in (1e-4, 1e-3, 1e-2, 5e-2)]
+        aperiodic = [2.0 * float(np.sqrt(item * clues.numbers[f"{place}.inertia"])) for item in stiffnesses]
+        bristle = Bristle(
+            Free(stiffnesses[1], 1e-2 * stiffnesses[-1], 1e3 * stiffnesses[0]),
+            Free(DAMPED * aperiodic[1], 0.0, OVERDAMPED * aperiodic[0]),
+        )
         law = with_bristle(shaft.friction.law, bristle)
         added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
-        trials = tuple(Trial(({path: stiffness},), inverse=True) for stiffness in stiffnesses)
-        return Augmentation(added, {path: np.inf}, trials)
+        trials = tuple(
+            Trial(({f"{stem}.sigma0": stiffness},), {f"{stem}.sigma1": damping}, inverse=True)
+            for stiffness, most in zip(stiffnesses, aperiodic, strict=True)
+            for damping in (0.0, DAMPED * most)
+        )
+        return Augmentation(added, {f"{stem}.sigma0": np.inf, f"{stem}.sigma1": 0.0}, trials)
 
 
 def _breakaway(clues: Clues, place: str) -> float:

@@ -78,7 +78,7 @@ class SensorDelayEffect(AbstractEffect):
     sentence: ClassVar[str] = "the channel is late"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.outputs if item.signal in ("theta", "omega") and item.delay == 0.0]
+        return [item.name for item in drive.outputs if item in _analog(drive) and item.delay == 0.0]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{place}.delay"

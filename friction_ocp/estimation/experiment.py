@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -17,7 +17,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.recording.conditioning import high_frequency_noise, smooth_motion
 from friction_ocp.recording.recording import Recording
-from friction_ocp.simulation.grid import FloatArray, Grid, InputSignal, build_grid
+from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, build_grid
 
 STILL, NOISE_OF_REST = 1e-3, 3.0
 """Share of the greatest speed, and standard deviations of its noise, up to which a prescribed speed has no sign."""
@@ -37,6 +37,10 @@ class Experiment:
     """(n, outputs) time derivatives of the smoothed samples."""
     curvature: FloatArray
     """(n, outputs) their second time derivatives."""
+    lost: BoolArray
+    """(n, outputs) where there was a sample before late channels were read earlier, and is none now."""
+    late: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By channel: the part of its delay, s, that is undone by reading its samples earlier."""
 
 
 def known_delay(channel: Channel) -> float:
@@ -72,6 +76,7 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         smooth=np.column_stack([value for value, _, _ in motions]),
         rate=np.column_stack([rate for _, rate, _ in motions]),
         curvature=np.column_stack([bend for _, _, bend in motions]),
+        lost=np.zeros((grid.time.size, len(columns)), dtype=bool),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -16,6 +16,7 @@ from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.clocks import on_one_clock
 from friction_ocp.estimation.experiment import Experiment, experiment, with_inputs
+from friction_ocp.estimation.lateness import lateness, read_earlier
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel, noise_floor
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.problem import Problem, RecordingUse
@@ -82,7 +83,7 @@ class Model:
 
 def prepare(problem: Problem) -> Model:
     """Build model functions, grids and scales; raises FrictionOcpError where recordings do not fit the drive."""
-    problem = on_one_clock(problem)
+    problem = _as_stamped(on_one_clock(problem))
     drive = stepped(problem.drive)
     space = parameter_space(problem, drive.parameter_names)
     sweep = Sweep(drive, space.active)
@@ -98,7 +99,7 @@ def prepare(problem: Problem) -> Model:
         [np.zeros((0, len(drive.state_names))), *(_suggested(sweep, space, item) for item in train)]
     )
     static = tuple(static_term(use, problem.drive, space) for use in problem.static)
-    return Model(
+    model = Model(
         problem=problem,
         drive=drive,
         space=space,
@@ -112,6 +113,55 @@ def prepare(problem: Problem) -> Model:
         max_step=max_step,
         static=static,
         static_validation=tuple(static_term(use, problem.drive, space) for use in problem.static_validation),
+    )
+    return in_time(model, space.guess)
+
+
+def _as_stamped(problem: Problem) -> Problem:
+    """Return a problem of which no channel is read earlier than its stamps say."""
+    train, validation = (tuple(replace(use, late={}) for use in uses) for uses in (problem.train, problem.validation))
+    return replace(problem, train=train, validation=validation)
+
+
+def in_time(model: Model, theta: FloatArray, channels: Collection[str] | None = None) -> Model:
+    """Return a model that reads late channels where what they show was true, with the delays that `theta` gives them.
+
+    The same model where it does. What is left of a delay, less than an interval between nodes, is expanded. Where
+    `channels` are stated all others are read as they were.
+    """
+    items = {item.name: item for item in (*model.train, *model.validation)}
+    late: dict[str, dict[str, float]] = {}
+    for use in model.problem.recordings:
+        left = dict(zip(model.space.leaf_names, model.space.numbers(theta, use.name), strict=True))
+        known = {name: use.late.get(name, 0.0) for name in model.drive.output_names}
+        delays = {
+            name: undone + (float(left[f"{name}.delay"]) if channels is None or name in channels else 0.0)
+            for name, undone in known.items()
+        }
+        late[use.name] = lateness(items[use.name], delays, use.late)
+    return with_late(model, late)
+
+
+def late_of(model: Model) -> dict[str, Mapping[str, float]]:
+    """Return by recording what reading late channels earlier undoes of their delays, s."""
+    return {use.name: use.late for use in model.problem.recordings if use.late}
+
+
+def with_late(model: Model, late: Mapping[str, Mapping[str, float]]) -> Model:
+    """Return a model that reads channels earlier by stated times, s, by recording; noise, steps and start stay."""
+    if all(use.late == late.get(use.name, {}) for use in model.problem.recordings):
+        return model
+    train, validation = (
+        tuple(replace(use, late=late.get(use.name, {})) for use in uses)
+        for uses in (model.problem.train, model.problem.validation)
+    )
+    problem, names = replace(model.problem, train=train, validation=validation), model.drive.output_names
+    return replace(
+        model,
+        problem=problem,
+        space=parameter_space(problem, model.space.leaf_names).moved(model.space.guess),
+        train=tuple(read_earlier(item, names, late.get(item.name, {})) for item in model.train),
+        validation=tuple(read_earlier(item, names, late.get(item.name, {})) for item in model.validation),
     )
 
 
@@ -138,7 +188,7 @@ def with_drive(model: Model, drive: Drive) -> Model:
         for items in (model.train, model.validation)
     )
     states = np.concatenate([_suggested(sweep, space, item) for item in train])
-    return replace(
+    seen = replace(
         model,
         problem=problem,
         drive=after,
@@ -152,6 +202,8 @@ def with_drive(model: Model, drive: Drive) -> Model:
         static=tuple(static_term(use, drive, space) for use in problem.static),
         static_validation=tuple(static_term(use, drive, space) for use in problem.static_validation),
     )
+    stated = [channel.name for channel in drive.outputs if isinstance(channel.delay, (int, float))]
+    return in_time(seen, space.guess, stated)
 
 
 def with_step(model: Model, max_step: float) -> Model:
@@ -167,8 +219,9 @@ def seen_by(model: Model, drive: SteppedDrive, item: Experiment, known: Sequence
 
     `known` are the inputs that it has; None for those of the model.
     """
-    recording = next(use.recording for use in model.problem.recordings if use.name == item.name)
-    return with_inputs(item, model.drive.input_names if known is None else known, drive.input_names, recording)
+    use = next(use for use in model.problem.recordings if use.name == item.name)
+    read = read_earlier(item, drive.output_names, use.late)
+    return with_inputs(read, model.drive.input_names if known is None else known, drive.input_names, use.recording)
 
 
 def _with_step(item: Experiment, max_step: float, known: float) -> Experiment:

@@ -136,7 +136,11 @@ def _table(
             table[path] = value
     table |= {name: symbol for name, symbol in symbols.items() if name not in table}
     resolved = resolve_ties(ties, table)
-    if isinstance(use, RecordingUse):  # stamps that were moved already leave the rest to the model
+    if isinstance(
+        use, RecordingUse
+    ):  # stamps that were moved, samples that are read earlier leave the rest to the model
+        for channel, seconds in use.late.items():
+            resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds
         for clock, gone in use.moved.items():
             for key, amount in zip(("offset", "drift"), gone, strict=True):
                 resolved[f"clocks.{clock}.{key}"] = resolved[f"clocks.{clock}.{key}"] - amount

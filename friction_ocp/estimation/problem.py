@@ -30,6 +30,8 @@ class RecordingUse:
     """By clock: offset, s, and drift that the stamps of its channels were relieved of."""
     original: Recording | None = None
     """The recording with its stamps as they were, where they were moved."""
+    late: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By channel: the part of its delay, s, that is undone by reading its samples earlier."""
 
     @property
     def name(self) -> str:

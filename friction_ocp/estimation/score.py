@@ -30,6 +30,8 @@ class FreeRun:
     """(n, outputs)."""
     states: FloatArray
     """(n, states)."""
+    late: Mapping[str, float]
+    """By channel: how much later than `time` the stamps of its samples are, s."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def simulate_recordings(
     for index, item in enumerate(experiments):
         result = program.simulate(index, point, with_states=True)
         assert result.states is not None
-        runs.append(FreeRun(item.name, item.grid.time, item.measured, result.y, result.states))
+        runs.append(FreeRun(item.name, item.grid.time, item.measured, result.y, result.states, item.late))
     return tuple(runs)
 
 

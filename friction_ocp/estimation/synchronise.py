@@ -1,4 +1,4 @@
-"""Fits again with stamps moved by what the clocks were found to be fast by, until little is left to expand."""
+"""Fits again with clocks and late channels read as they were found to be, until little of a delay is to be expanded."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.clocks import Moves, on_one_clock
-from friction_ocp.estimation.model import Model, prepare, with_step
+from friction_ocp.estimation.model import Model, in_time, late_of, prepare, with_late, with_step
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import Fitted, final_solver, limits, program_builder
@@ -22,21 +22,24 @@ def synchronised(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, F
     """Return model and fit with stamps so near that the expansion of the delays is exact."""
     for turn in range(MOST_TURNS):
         theta = fitted.solution.point.theta
-        if not _is_fitted(model) or _distance(model, theta) <= NEAR:
+        nearer = in_time(model, theta)
+        if _is_fitted(model) and _distance(model, theta) > NEAR:
+            nearer = with_moves(nearer, _found(model, theta))
+        if nearer is model:
             break
-        model = with_moves(model, _found(model, theta))
+        model = nearer
         program = program_builder(model)(model, 0.0, fitted.program.loss)
         start = Point(model.space.clip(theta), program.suggested_nodes(theta))
-        end = final_solver(model)(program, start, limits(model), phases.begin(f"clocks, turn {turn + 1}"))
+        end = final_solver(model)(program, start, limits(model), phases.begin(f"clocks and delays, turn {turn + 1}"))
         fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
     return model, fitted
 
 
 def with_moves(model: Model, moves: Moves) -> Model:
-    """Return a model whose stamps are moved by other amounts; steps, noise and start stay."""
+    """Return a model whose stamps are moved by other amounts; steps, noise, start and late channels stay."""
     if not moves:
         return model
-    fresh = prepare(on_one_clock(model.problem, moves))
+    fresh = with_late(prepare(on_one_clock(model.problem, moves)), late_of(model))
     moved = replace(with_step(fresh, model.max_step), noise_levels=model.noise_levels)
     return replace(moved, space=moved.space.moved(model.space.guess))
 

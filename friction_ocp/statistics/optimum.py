@@ -11,7 +11,7 @@ import numpy as np
 
 from friction_ocp.estimation.clocks import Moves
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.model import Model, with_step
+from friction_ocp.estimation.model import Model, late_of, with_late, with_step
 from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.noise_level import with_levels
 from friction_ocp.estimation.program import Point
@@ -34,15 +34,19 @@ class Optimum:
     """Torque noise that was estimated."""
     moves: Moves = dataclasses.field(default_factory=dict[str, dict[str, tuple[float, float]]])
     """By how much stamps were moved."""
+    late: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict[str, Mapping[str, float]])
+    """By recording and channel: what reading samples earlier undoes of delays, s."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
         """Take the end of a fit, and what of its model was settled on the way, without its program."""
-        return cls(fitted.solution, fitted.program.loss, model.max_step, model.noise_levels, moves_of(model))
+        settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model))
+        return cls(fitted.solution, fitted.program.loss, *settled)
 
     def settled(self, model: Model) -> Model:
-        """Return the model with the integrator steps and the torque noise that the fit ended with."""
-        return with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
+        """Return the model with the integrator steps, the torque noise and the stamps that the fit ended with."""
+        moved = with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
+        return with_late(moved, self.late)
 
     def fitted(self, model: Model) -> Fitted:
         """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
@@ -61,6 +65,7 @@ class Optimum:
             "objective": float(objective) if np.isfinite(objective) else None,
             "max_step": self.max_step,
             "moves": {name: {clock: list(fast) for clock, fast in item.items()} for name, item in self.moves.items()},
+            "late": {name: dict(item) for name, item in self.late.items()},
             "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
@@ -81,7 +86,11 @@ class Optimum:
             for name, item in content["moves"].items()
         }
         solution = Solution(point=point, objective=objective, **facts)
-        return cls(solution, loss, float(content["max_step"]), levels, moves)
+        late = {
+            name: {channel: float(seconds) for channel, seconds in item.items()}
+            for name, item in content["late"].items()
+        }
+        return cls(solution, loss, float(content["max_step"]), levels, moves, late)
 
 
 def _plain(level: NoiseLevel) -> dict[str, Any]:

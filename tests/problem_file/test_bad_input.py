@@ -57,7 +57,6 @@ DUTY = {"type": "duty", "feedback": "position", "kp": 1.0}
 SECOND_SHAFT = {"name": "arm", "inertia": 0.1}
 TWO_SHAFTS = [{"name": "load", "inertia": 0.1}, SECOND_SHAFT]
 RIPPLING = {"cosine": {"guess": 0}, "sine": 0.01, "period": 1}
-CURRENT_SEEN = {"measures": "motor.current", "role": "output", "noise_std": 0.01}
 LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
 
 FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
@@ -454,10 +453,6 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
     "no motor": (
         several(drop("drive/motor"), drop("channels/current")),
         "there is no motor, and no input prescribes the motion of a shaft",
-    ),
-    "delay that nothing shows": (
-        several(put("channels/position/role", "input"), put("channels/current", {**CURRENT_SEEN, "delay": 0.002})),
-        "channels.current.delay: a delay of motor.current has no effect on what is simulated; take it off the time",
     ),
     "validated on the training data": (
         put("recordings/validation", ["sweep.h5"]),

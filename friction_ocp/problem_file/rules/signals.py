@@ -214,15 +214,6 @@ def delays_of_inputs_are_known(case: Case) -> Iterator[Finding]:
             )
 
 
-def delays_are_of_angles_or_speeds(case: Case) -> Iterator[Finding]:
-    """A delay is told from the motion's own derivatives, which an acceleration or a torque does not have."""
-    for channel in case.drive.outputs:
-        if channel.signal not in ("theta", "omega") and channel.delay != 0.0:
-            what = f"a delay of {channel.measures} has no effect on what is simulated"
-            remedy = "take it off the time stamps of this channel"
-            yield Finding(case.at(f"channels.{channel.name}.delay"), what, remedy=remedy, severity="warning")
-
-
 def clocks_exist(case: Case) -> Iterator[Finding]:
     """A channel is stamped by a clock that the file describes."""
     names = [clock.name for clock in case.drive.clocks]
@@ -273,7 +264,6 @@ SIGNALS: tuple[Rule, ...] = (
     inputs_are_single,
     motors_are_driven_once,
     delays_of_inputs_are_known,
-    delays_are_of_angles_or_speeds,
     clocks_exist,
     clocks_of_inputs_are_known,
     delay_needs_a_sample_time,
