@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.drive.parts import Drive
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, in_time, with_drive
@@ -75,6 +76,11 @@ class FittedModel:
         """The cost of all residuals: half their sum of squares, or what the loss makes of them."""
         return self.linear.program.objective(self.linear.point) + self._unseen
 
+    @property
+    def holds(self) -> bool:
+        """Whether the simulation does not break down."""
+        return bool(np.isfinite(self.objective))
+
     @cached_property
     def cost(self) -> float:
         """The same with the noise that this model's own inertia would show: what models are compared by."""
@@ -90,7 +96,20 @@ class FittedModel:
 
 
 def fit_base(model: Model) -> FittedModel:
-    """Fit the base model from its guesses and lay the footing on which all models are compared."""
+    """Fit the base model from its guesses and lay the footing on which all models are compared.
+
+    Raises FrictionOcpError where no simulation of it holds.
+    """
+    fitted = _fitted_base(model)
+    if not fitted.holds:
+        where = f"{model.problem.path or model.problem.title}: diagnose"
+        what = "the simulation of the model as it stands breaks down along the recordings"
+        remedy = "start from other guesses or narrow the bounds"
+        raise FrictionOcpError(Finding(where, what, "a model that can be simulated", remedy))
+    return fitted
+
+
+def _fitted_base(model: Model) -> FittedModel:
     rough = footing(model, model.space.guess)
     if rough.segment_s is None and model.problem.estimation.loss == "squares":
         return _free_base(model, rough)

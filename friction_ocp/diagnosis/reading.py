@@ -54,13 +54,17 @@ def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key]
 
 
 def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
-    """Return the power of the innovations of a base model with some additions, fitted from where they were before."""
+    """Return the power of the innovations of a base model with some additions, fitted from where they were before.
+
+    Infinite where its simulation breaks down there.
+    """
     if not keys:
         return innovations(base).ratio
     model = with_drive(base.model, with_additions(base, keys))
     known = {**base.values, **final.values}
     theta = np.array([known.get(name, guess) for name, guess in zip(model.space.names, model.space.guess, strict=True)])
-    return innovations(polished(model, base.footing, theta, None)).ratio
+    fitted = polished(model, base.footing, theta, None)
+    return innovations(fitted).ratio if fitted.holds else np.inf
 
 
 def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:

@@ -30,6 +30,8 @@ def without_superfluous(
     for key in dict.fromkeys(accepted[:-1]):
         kept = [other for other in accepted if other != key]
         simpler = without_addition(current, with_additions(base, kept))
+        if not simpler.holds:
+            continue
         gains = _dearer(simpler, current)
         if not _certain(current, gains, level, rng) and float(np.sum(gains)) < required(base, simpler):
             current, accepted = simpler, kept

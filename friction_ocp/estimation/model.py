@@ -31,6 +31,9 @@ STEP_PER_RADIAN = 0.05
 STEP_PER_DECAY = 0.1
 """Integrator step over the shortest decay time."""
 
+NEVER = 1e12
+"""Speed, rad/s, up to which friction keeps its level at rest where its fall does not count."""
+
 MOST_STEPS = 1000
 """Integrator steps in a usual sampling interval: beyond them the guesses make no sense."""
 
@@ -352,8 +355,13 @@ def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> Com
 
 
 def standstill_slope(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> FloatArray:
-    """Return (states, states) how the states' rates depend on the states at standstill, without dry friction."""
+    """Return (states, states) how the states' rates depend on the states at standstill, without dry friction.
+
+    Nor with its fall beyond standstill, which is infinitely steep there for exponents below 1: what rests sticks.
+    """
     tiny, states = 1e-6, len(drive.state_names)
+    falls = np.array([".omega_s" in name for name in drive.parameter_names], dtype=bool)
+    numbers = np.where(falls, NEVER, numbers)
     x = ca.SX.sym("x", states)
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
     after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
