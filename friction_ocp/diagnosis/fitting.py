@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from friction_ocp.diagnosis.contrast import Contrast, contrast
+from friction_ocp.diagnosis.easing import FAR, along, eased, finer, missed
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.diagnosis.own_noise import with_own_noise
@@ -125,7 +126,20 @@ def _fitted_base(model: Model) -> FittedModel:
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
     started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
-    return freed(timed(_from_rest(started)))
+    return freed(timed(_from_rest(_from_afar(started, [model.space.guess, end.theta]))))
+
+
+def _from_afar(fitted: FittedModel, starts: Sequence[FloatArray]) -> FittedModel:
+    """Fit again through wide gaps from some starts where the fit has missed much, on finer segments where needed."""
+    program, point = fitted.linear.program, fitted.linear.point
+    factor = missed(program, point)
+    if not FAR < factor < np.inf:
+        return fitted
+    foot, wide = finer(fitted.model, fitted.footing, starts, factor)
+    finely = foot.training(fitted.model)
+    begins = [along(finely, program, point), eased(finely, wide, factor)]
+    best = solve_gauss_newton(finely, min(begins, key=finely.objective), WARM).point
+    return FittedModel(fitted.model, foot, linear_program(finely, best))
 
 
 def _free_base(model: Model, rough: Footing) -> FittedModel:
@@ -188,12 +202,18 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     """Fit a candidate, a few steps from each of the starts that the score test predicts.
 
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
+    Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
     program = base.footing.training(model)
     points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
     ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
+    factor, best = missed(base.linear.program, base.linear.point), min(end.objective for end in ends)
+    if base.footing.segment_s is not None and FAR < factor < np.inf and base.objective - best < item.gain:
+        away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
+        far = [_steps(base, model, program, eased(program, point, factor)) for point in away]
+        ends += [timed(end, QUICK) for end in far]
     return min(ends, key=lambda fitted: fitted.objective)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -64,6 +64,8 @@ class Footing:
     """Names of the inputs of the base model."""
     loss: AbstractLoss = Squares()
     """Of measurement errors: the one that the problem asks for where free runs are compared."""
+    divided: Mapping[str, tuple[float, ...]] = field(default_factory=dict[str, tuple[float, ...]])
+    """By recording: times of further cuts, s."""
 
     def program(self, model: Model, experiments: tuple[Experiment, ...]) -> Program:
         """Return the likelihood of some recordings under a model, as a least-squares program."""
@@ -86,6 +88,8 @@ class Footing:
         if impulses:
             total = sum(np.square(values) for values in impulses.values())
             first = with_cuts(first, np.asarray(total))
+        further = np.flatnonzero(np.isin(item.grid.time, self.divided.get(item.name, ())))
+        first = np.unique(np.concatenate([first, further[further < first[-1]]])).astype(np.int64)
         start = np.zeros((len(first) - 1, model.state_scale.size))
         start[0] = 1.0 / model.state_scale
         weights = gap_roots(model, self, item, first, impulses)

@@ -27,7 +27,7 @@ def divided(model: Model, program: Program, point: Point) -> tuple[Program, Poin
     for index, (item, cut) in enumerate(zip(program.experiments, program.segments, strict=True)):
         track = program.simulate(index, point, derivatives=True, with_states=True)
         assert track.states is not None and track.dend is not None
-        first = _divided(cut.first, _growth(track.dend[:, :, : track.states.shape[1]]))
+        first = cut_where_they_grow(cut.first, track.dend[:, :, : track.states.shape[1]])
         own = track.states[first[:-1]].copy()
         own[np.searchsorted(first, cut.first[:-1])] = point.nodes[index]
         nodes.append(own)
@@ -51,6 +51,14 @@ def _start_weight(cut: Segments, count: int) -> FloatArray | None:
         return None
     rest = np.zeros((count - 1, cut.start_weight.shape[1]))
     return np.concatenate([cut.start_weight[:1], rest])
+
+
+def cut_where_they_grow(first: IntArray, slopes: FloatArray) -> IntArray:
+    """Return the first nodes of segments of which none lets differences grow by more than GROWTH.
+
+    `slopes` (segments, states, states) are the derivatives of the ends of the segments by their starts.
+    """
+    return _divided(first, _growth(slopes))
 
 
 def _growth(slopes: FloatArray) -> FloatArray:
