@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
+from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered
 from friction_ocp.diagnosis.fitting import FittedModel
@@ -42,6 +43,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "rounds": [_round(diagnosis, k) for k in range(len(diagnosis.rounds))],
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
         "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
+        "cannot_tell": [_blind_spot(item, problem.drive) for item in diagnosis.blind],
         "accepted": [{**_explained(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],
         "remainder": _remainder(diagnosis),
         "gap": _gap(diagnosis),
@@ -61,6 +63,15 @@ def _named(key: Key) -> dict[str, str]:
 
 def _explained(key: Key) -> dict[str, str]:
     return {**_named(key), "meaning": effects()[key[0]].sentence}
+
+
+def _blind_spot(item: BlindSpot, drive: Drive) -> dict[str, Any]:
+    motion = drive.shaft(item.component).motion
+    return {
+        **_explained((item.effect, item.component)),
+        "record_below": {"value": item.below, "unit": si_unit("speed", motion)},
+        "unseen": {"value": item.size, "unit": si_unit("torque", motion)},
+    }
 
 
 def _next_experiment(following: FollowUp) -> dict[str, Any]:

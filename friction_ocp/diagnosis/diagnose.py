@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.diagnosis.bench import Crew, Tell, open_bench
+from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
@@ -60,6 +61,8 @@ class Diagnosis:
     remainder: Excess
     slow: tuple[SlowTorque, ...]
     """Slow torques that the final model lacks, by shaft."""
+    blind: tuple[BlindSpot, ...]
+    """Effects that the final model lacks and that the recordings, made too fast, would not show."""
     seconds: float
     stated: Problem | None = None
     """The problem as it was given, where its inputs are not read as it states."""
@@ -191,7 +194,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             if not innovations(current).significant(level):
                 break
     current, checked = _checked(bench.current, level)
-    rounds += checked
+    rounds, clues, left = [*rounds, *checked], clues_of(current), innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     return Diagnosis(
         problem=problem,
@@ -202,8 +205,9 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         level=level,
         before=free_errors(base, held_out=True),
         after=free_errors(current, held_out=True),
-        remainder=innovations(current),
-        slow=slow_torques(current, clues_of(current)),
+        remainder=left,
+        slow=slow_torques(current, clues),
+        blind=blind_spots(current, left, clues, names),
         seconds=time.perf_counter() - began,
     )
 

@@ -1,8 +1,8 @@
 """Fits that begin far from the recordings: through gaps wider than noise makes them, narrowed step by step.
 
 Where a model lacks much, gaps as narrow as torque noise bind whole recordings together, and an iteration from afar
-comes to rest at the first kink. Wide gaps let every segment follow its own stretch of the recording, and parameters move
-before the gaps pull them together. Segments in which small differences grow, as at breakaway, are cut first.
+comes to rest at the first kink. Wide gaps let every segment follow its own stretch of the recording, and parameters
+move before the gaps pull them together. Segments in which small differences grow, as at breakaway, are cut first.
 """
 
 from __future__ import annotations

@@ -212,7 +212,7 @@ def unit_covariances(model: Model, foot: Footing, recording: str, spans: FloatAr
     mech = model.drive.mechanism
     numbers = _known_numbers(model, foot, recording)
     values = np.array([numbers[name] for name in model.space.leaf_names])
-    slopes = slopes_at(model.drive, values, typical_inputs(model.problem, model.drive), at)
+    slopes = slopes_at(model.drive, values, typical_inputs(model.problem, model.drive), list(at))
     states = at.shape[1]
     found = np.zeros((len(mech.topology.roots), spans.size, states, states))
     for k, group in enumerate(mech.free_groups):
@@ -382,7 +382,7 @@ def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray
     """Return (quarters, states) a motion of rms speed; rest where no bristle tells it from any other."""
     moves = motions_of(model, foot, item, np.arange(item.grid.time.size, dtype=np.int64))
     speeds = moves[:, len(model.drive.mechanism.angle_groups) :][:, : len(model.drive.mechanism.free_groups)]
-    power = np.sum(speeds**2, axis=1)
+    power: FloatArray = np.sum(speeds**2, axis=1)
     return np.tile(moves[int(np.argmin(np.abs(power - np.mean(power))))], (QUARTERS.size, 1))
 
 

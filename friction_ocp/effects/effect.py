@@ -192,6 +192,25 @@ class Augmentation:
     trials: tuple[Trial, ...]
 
 
+@dataclass(frozen=True)
+class Hiding:
+    """An effect that shows below some speed alone."""
+
+    augmentation: Augmentation
+    amplitude: str
+    """Path of its size, N m or N."""
+    speed: str
+    """Path of the speed above which it fades."""
+    tried: float
+    """Size at which it is simulated: small enough to be linear."""
+    usual: float
+    """Size that nobody would be surprised at."""
+
+    def values(self, speed: float) -> dict[str, float]:
+        """Return the values of the added parameters for a speed."""
+        return {**self.augmentation.off, self.amplitude: self.tried, self.speed: speed}
+
+
 class AbstractEffect(ABC):
     """Something that a model may lack. Instances hold no data: an effect is added at a place of a drive."""
 
@@ -212,6 +231,10 @@ class AbstractEffect(ABC):
 
         What a machine has is never quite of the shape that a catalogue gives it.
         """
+        return None
+
+    def hiding(self, drive: Drive, place: str, clues: Clues) -> Hiding | None:
+        """Return the effect as one that only slow motion shows; None where it is not of that kind."""
         return None
 
     def addition(self, drive: Drive, place: str, clues: Clues) -> Augmentation:

@@ -7,10 +7,12 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
+from friction_ocp.drive.values import bind_drive
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
     Clues,
+    Hiding,
     Trial,
     change_shaft,
     either_way,
@@ -72,6 +74,14 @@ class StribeckEffect(AbstractEffect):
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.omega_s": omega_s}) for omega_s in speeds)
         added = with_friction(drive, drive.shaft(place), stribeck=rise)
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)
+
+    def hiding(self, drive: Drive, place: str, clues: Clues) -> Hiding:
+        """As large as the dry friction itself: breakaway at twice the Coulomb friction."""
+        path, added = f"{place}.friction.added.stribeck", self.augment(drive, place, clues)
+        element = bind_drive(drive, clues.numbers).shaft(place).friction
+        level = 0.5 * float(element.magnitude("positive", 0.0, 0.0) + element.magnitude("negative", 0.0, 0.0))
+        tried = SHARE * clues.typical_torque[place]
+        return Hiding(added, f"{path}.torque", f"{path}.omega_s", tried, level)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         terms, path = added_terms(drive.shaft(place).friction.law), f"{place}.friction.added.stribeck.delta"

@@ -351,12 +351,14 @@ def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> Com
     What follows a command late is left out: the step is exact in it, however short its time constant.
     """
     kept = [k for k, name in enumerate(drive.state_names) if not name.endswith(".lagged")]
-    rest = np.zeros((1, len(drive.state_names)))
-    return np.linalg.eigvals(slopes_at(drive, numbers, inputs, rest)[0][np.ix_(kept, kept)]).astype(complex)
+    (slope,) = slopes_at(drive, numbers, inputs, [np.zeros(len(drive.state_names))])
+    return np.linalg.eigvals(slope[np.ix_(kept, kept)]).astype(complex)
 
 
-def slopes_at(drive: SteppedDrive, numbers: FloatArray, inputs: list[float], at: FloatArray) -> FloatArray:
-    """Return (k, states, states) how the states' rates depend on the states at (k, states), without dry friction.
+def slopes_at(
+    drive: SteppedDrive, numbers: FloatArray, inputs: list[float], at: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return (states, states) for each of some states: how the rates depend on them there, without dry friction.
 
     Nor with its fall beyond standstill, which is infinitely steep there for exponents below 1: what rests sticks.
     """
@@ -367,7 +369,7 @@ def slopes_at(drive: SteppedDrive, numbers: FloatArray, inputs: list[float], at:
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
     after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
     slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])
-    return np.stack([(np.asarray(slope(each)) - np.eye(states)) / tiny for each in at])
+    return [(np.asarray(slope(each)) - np.eye(states)) / tiny for each in at]
 
 
 def typical_inputs(problem: Problem, drive: SteppedDrive) -> list[float]:

@@ -8,7 +8,13 @@ from typing import Any
 
 from friction_ocp.plots.numbers import NOTHING, plain, significant, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, objects, part, rows
-from friction_ocp.report.diagnosis_words import alias_sentences, bias_sentences, diagnosis_sentence, round_sentence
+from friction_ocp.report.diagnosis_words import (
+    alias_sentences,
+    bias_sentences,
+    blind_spot_sentences,
+    diagnosis_sentence,
+    round_sentence,
+)
 from friction_ocp.report.page import paragraphs, render_page
 from friction_ocp.report.pictures import embedded_png
 from friction_ocp.whole_file import write_text
@@ -39,6 +45,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
             "rounds": [_round(item) for item in rows(result, "rounds")],
             "aliases": alias_sentences(result),
+            "blind": blind_spot_sentences(result),
             "biased": bias_sentences(result),
             "next": str(following["text"]) if following else "",
             "traces": [name for name in figures if name.startswith("before-after-")],

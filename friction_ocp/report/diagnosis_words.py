@@ -66,6 +66,22 @@ def alias_sentences(result: Json) -> list[str]:
     return [" or ".join(_named(item) for item in members) for members in rows(result, "alias_sets")]
 
 
+def blind_spot_sentences(result: Json) -> list[str]:
+    """Say which effects these recordings are too fast for."""
+    return [_blind_spot(item) for item in rows(result, "cannot_tell")]
+
+
+def _blind_spot(item: Json) -> str:
+    speed, size = (f"{significant(part(item, key)['value'], 2)} {unit_text(part(item, key)['unit'])}" for key in _SPOT)
+    return (
+        f"{_named(item)}: these recordings cannot tell, where its speed is below {speed}; even {size} of it would stay "
+        f"in the noise. Record below {speed}."
+    )
+
+
+_SPOT = ("record_below", "unseen")
+
+
 def bias_sentences(result: Json) -> list[str]:
     """Say by how much each biased parameter had been off."""
     lines: list[str] = []
@@ -95,6 +111,7 @@ def diagnosis_summary(result: Json) -> str:
         for cause in rows(item, "causes")[:3]:
             lines.append(f"  {_named(cause)}: probability {whole_percent(cause['probability'])}")
     lines += [f"cannot be told apart: {line}" for line in alias_sentences(result)]
+    lines += blind_spot_sentences(result)
     lines += [f"biased before: {line}" for line in bias_sentences(result)]
     following = result.get("next_experiment")
     return "\n".join([*lines, str(following["text"])] if following else lines)

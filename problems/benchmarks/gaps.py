@@ -6,7 +6,7 @@ import copy
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import yaml
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.conditioning import without_low_pass
-from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.hdf5 import read_static_points, write_recording, write_static_points
 from friction_ocp.recording.recording import Channel, Recording
 
 ROOT = Path(__file__).parents[2]
@@ -121,6 +121,21 @@ def lto(kind: str, folder: Path) -> Path:
     used = content["recordings"].items()
     content["recordings"] = {split: [str(data / Path(file).name) for file in files] for split, files in used}
     path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def lto_with_rise(size: float, speed: float, folder: Path) -> Path:
+    """Write the same with the break in the fast part, and there Stribeck friction of a size, N m, and speed, rad/s."""
+    path = lto("high", folder)
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    constant = float(content["drive"]["motor"]["torque_constant"])
+    for files in content["recordings"].values():
+        points = read_static_points(files[0])
+        assert points.current is not None
+        current = points.current + size * np.exp(-((points.speed / speed) ** 2)) / constant
+        files[0] = str(folder / Path(files[0]).name)
+        write_static_points(replace(points, current=current), files[0])
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     return path
 

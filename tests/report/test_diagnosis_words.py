@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from friction_ocp.report.diagnosis_words import diagnosis_sentence
+from friction_ocp.report.diagnosis_words import blind_spot_sentences, diagnosis_sentence
 
 LOAD = {"effect": "load_dependence", "component": "servo"}
 COGGING = {"effect": "cogging", "component": "servo"}
@@ -28,3 +28,16 @@ def test_an_unknown_effect_alone_is_no_part() -> None:
     """Where nothing was found the sentence does not speak of a part."""
     assert "in part" not in diagnosis_sentence(result("unknown_effect", accepted=[]))
     assert "cannot tell" not in diagnosis_sentence(result("explained"))
+
+
+def test_what_recordings_are_too_fast_for_is_told_with_the_speed_to_record() -> None:
+    """The effect, the size that would hide, and below which speed to record."""
+    spot = {
+        "effect": "stribeck",
+        "component": "motor",
+        "record_below": {"value": 2.61, "unit": "rad/s"},
+        "unseen": {"value": 0.11, "unit": "N m"},
+    }
+    (said,) = blind_spot_sentences(result("no_gap", cannot_tell=[spot]))
+    assert said.startswith("stribeck at motor: these recordings cannot tell")
+    assert said.endswith("0.11 N m of it would stay in the noise. Record below 2.6 rad/s.")
