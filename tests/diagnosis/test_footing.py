@@ -1,0 +1,52 @@
+"""How far torque noise moves a shaft: held by its bristles at rest, free of them where it slides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
+
+from friction_ocp.diagnosis.footing import footing, unit_covariances
+from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.problem_file.load import load_problem
+
+STIFFNESS, DAMPING = 200.0, 0.1
+
+
+@pytest.fixture(scope="module")
+def bristled(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """Return an axis whose model has a bristle, at its guesses."""
+    path = write_case(tmp_path_factory.mktemp("bristled"), axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    shaft: dict[str, Any] = document["drive"]["shafts"][0]
+    shaft["inertia"] = INERTIA
+    numbers = {"tau_c": {"guess": COULOMB, "min": 0}, "tau_s": 1.5 * COULOMB, "omega_s": 2.0, "delta": 0.85}
+    shaft["friction"] = {"law": "lugre", **numbers, "sigma0": STIFFNESS, "sigma1": DAMPING, "sigma2": VISCOUS}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return prepare(load_problem(path))
+
+
+def covariance(model: Model, span: float, omega: float, bent: float) -> np.ndarray:
+    """Return what unit acceleration noise gathers in angle, speed and deflection over a span, s."""
+    at = np.array([[0.0, omega, bent]])
+    foot = footing(model, model.space.guess)
+    return unit_covariances(model, foot, "a", np.array([span]), at)[0, 0]
+
+
+def test_at_rest_the_bristle_holds_the_shaft(bristled: Model) -> None:
+    """The variance of an oscillator under white noise: J^2 / (2 c k) of the angle, J / (2 c) of the speed."""
+    found, damping = covariance(bristled, 20.0, 0.0, 0.0), DAMPING + VISCOUS
+    assert found[0, 0] == pytest.approx(INERTIA**2 / (2.0 * damping * STIFFNESS), rel=0.01)
+    assert found[1, 1] == pytest.approx(INERTIA / (2.0 * damping), rel=0.01)
+
+
+@pytest.mark.parametrize("span", [0.01, 0.1, 10.0])
+def test_where_it_slides_only_drag_does(span: float, bristled: Model) -> None:
+    """The speed wanders as under viscous friction alone, however fast the bristle forgets over however long a span."""
+    omega = 50.0
+    found, rate = covariance(bristled, span, omega, 1.5 * COULOMB / STIFFNESS), VISCOUS / INERTIA
+    assert found[1, 1] == pytest.approx((1.0 - np.exp(-2.0 * rate * span)) / (2.0 * rate), rel=0.02)
+    assert found[2, 2] < 1e-3 * found[0, 0] + 1e-12
