@@ -35,8 +35,9 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
     path = diagnosis.problem.path
     if path is not None:
         for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
-            drive, source = fitted.model.problem.drive, diagnosis.problem.text
-            text = write_problem(path, drive, fitted.values, target, fitted.model.max_step, source)
+            model, source = fitted.model, diagnosis.problem.text
+            settings = (model.max_step, source, model.problem.estimation.horizon_s)
+            text = write_problem(path, model.problem.drive, fitted.values, target, *settings)
             write_text(target / name, text)
     if following is not None and following.option is not None:
         write_recording(following.option.run.recording, target / "next_experiment.h5")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -27,6 +27,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
@@ -70,7 +71,7 @@ class Bench:
     @cached_property
     def base(self) -> FittedModel:
         """The base model on its footing."""
-        model = prepare(self.problem)
+        model = judged_alike(prepare(self.problem))
         train = restored_footing(self.footing, model)
         return seated(model, train, self.base_point)
 
@@ -107,6 +108,15 @@ class Bench:
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind what is built: model functions belong to their process."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
+
+
+def judged_alike(model: Model) -> Model:
+    """Return a model that states over what time its free runs are judged, and with it all that it is compared with.
+
+    Gravity that is added would hold a drive that drifts, and a further mode is faster than those that were there.
+    """
+    options = replace(model.problem.estimation, horizon_s=horizon(model))
+    return replace(model, problem=replace(model.problem, estimation=options))
 
 
 def point_document(fitted: FittedModel) -> Json:

@@ -50,13 +50,23 @@ class Errors:
 def simulate_recordings(
     model: Model, experiments: tuple[Experiment, ...], theta: FloatArray, width: float = 0.0
 ) -> tuple[FreeRun, ...]:
-    """Simulate recordings freely with exact friction, over windows where the drive drifts."""
+    """Simulate recordings freely with exact friction, over windows where the drive drifts.
+
+    Windows of a fitted free run start where they come closest, as far as that is found: from what was measured, or from
+    the smoothed state, whichever leads to less.
+    """
     if not experiments:
         return ()
     span = horizon(model)
     program = free_run(model, experiments, width, Squares(), span)
     point = Point(theta, program.suggested_nodes(theta))
-    point = solve_nodes(program, point) if fits_free_run(model) else _smoothed(model, experiments, program, point)
+    if not fits_free_run(model):
+        point = _smoothed(model, experiments, program, point)
+    elif span is None:
+        point = solve_nodes(program, point)
+    else:
+        starts = (point, _smoothed(model, experiments, program, point))
+        point = _better(program, *(solve_nodes(program, start) for start in starts))
     runs: list[FreeRun] = []
     for index, item in enumerate(experiments):
         result = program.simulate(index, point, with_states=True)
@@ -70,6 +80,22 @@ def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Progra
     smoother = relaxed(model, experiments, 0.0, Squares())
     solved = solve_nodes(smoother, Point(point.theta, smoother.suggested_nodes(point.theta)))
     return program.point_along(smoother, solved)
+
+
+def _better(program: Program, one: Point, other: Point) -> Point:
+    """Return the start of every window from the point with which it costs less."""
+    nodes: list[FloatArray] = []
+    for index in range(len(program.segments)):
+        costs = [_window_costs(program, index, point) for point in (one, other)]
+        nodes.append(np.where((costs[0] <= costs[1])[:, None], one.nodes[index], other.nodes[index]))
+    return Point(one.theta, tuple(nodes))
+
+
+def _window_costs(program: Program, index: int, point: Point) -> FloatArray:
+    """Return (windows,) what the samples of each window cost; infinite where the simulation breaks down."""
+    errors = program.sample_errors(index, program.simulate(index, point).y)
+    costs = np.add.reduceat(np.sum(program.loss.cost(errors), axis=1), program.segments[index].first[:-1])
+    return np.where(np.isfinite(costs), costs, np.inf)
 
 
 NOTHING, RELATIVE = 1e-3, 1e-9

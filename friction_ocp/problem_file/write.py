@@ -27,12 +27,14 @@ def write_problem(
     folder: str | Path,
     max_step: float | None = None,
     text: str = "",
+    horizon_s: float | None = None,
 ) -> str:
     """Return the text of a problem file for `folder`: the file `source` with another drive, its guesses replaced.
 
     `values` are fitted values by parameter name; the value of one recording, named `path@recording`, becomes a `set`
     beside its file. Paths of recordings are written relative to `folder`. `text` is the file as it was read, if that is
-    known: it may have changed since.
+    known: it may have changed since. `max_step` and `horizon_s` are what the values belong to, unless the file states
+    others.
     """
     source = Path(source)
     document = read_document(source, text or None)
@@ -45,8 +47,9 @@ def write_problem(
         elif key == "drive":
             fresh |= written
     rewrite_recordings(fresh, source, Path(folder), values)
-    if max_step is not None:
-        fresh["estimation"] = {"max_step": max_step} | (fresh.get("estimation") or {})
+    used = {"max_step": max_step, "horizon_s": horizon_s}
+    stated = {key: value for key, value in used.items() if value is not None}
+    fresh["estimation"] = stated | (fresh.get("estimation") or {})
     return dump_document(fresh, document.head)
 
 
