@@ -1,0 +1,100 @@
+"""Earlier additions are examined again, free runs of all models are judged over the same time, bristles are damped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, write_case
+from plant import PlantFriction, PlantRipple
+
+from friction_ocp.diagnosis.bench import Bench, blocks_like, judged_alike, open_bench, screen
+from friction_ocp.diagnosis.diagnose import diagnose
+from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.fitting import completed, held_out, quick_refit
+from friction_ocp.diagnosis.reexamine import exchanged
+from friction_ocp.diagnosis.select import Rival, Round, choose
+from friction_ocp.diagnosis.worth import Key
+from friction_ocp.drive.parts import Gravity
+from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.horizon import fits_free_run, horizon
+from friction_ocp.estimation.model import prepare, with_drive
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.problem_file.write import write_problem
+from friction_ocp.statistics.execution import Execution
+
+LEVEL = 0.01
+
+
+def rival(bench: Bench, key: Key) -> Rival:
+    """Return a candidate refitted, with what it gains on recordings left out."""
+    found = screen(bench.current.model, bench.current.linear, bench.blocks, effects()[key[0]], key[1], bench.clues)
+    assert found is not None
+    fitted = completed(quick_refit(bench.current, found))
+    gains = bench.blocks.sums(held_out(bench.current)) - blocks_like(bench.current, fitted, bench.blocks)
+    return Rival(found, fitted, gains)
+
+
+def round_of(bench: Bench, keys: list[Key]) -> Round:
+    """Return the round in which the first of some candidates was accepted."""
+    rivals = [rival(bench, key) for key in keys]
+    choice = choose(rivals, bench.blocks, LEVEL, np.random.default_rng(0))
+    before = bench.current
+    return Round((), choice, before, excess(before.linear.rows, bench.blocks), rivals[0])
+
+
+def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None:
+    """A break accepted for quadratic drag goes when cogging is in beside it; what is right already stays."""
+    plant = axis(law="quadratic", quadratic=1e-5)
+    cogging = PlantRipple(3.1, (0.05 * TORQUE_CONSTANT,), (0.0,))
+    plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
+    names = ("polyline_break", "quadratic_drag", "cogging")
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), Execution(InProcess()))
+    wrong, right, other = ((name, "motor") for name in names)
+    rounds = list[Round]()
+    for keys in ([wrong, right], [other]):
+        rounds.append(round_of(bench, keys))
+        accepted = rounds[-1].accepted
+        assert accepted is not None
+        bench = bench.at(accepted.fitted)
+    rng = np.random.default_rng(0)
+    current, told, kept = exchanged(bench.base, bench.current, rounds, [wrong, other], LEVEL, rng)
+    assert kept == [right, other] and current.cost < bench.current.cost
+    first = told[0]
+    assert first.accepted is not None and first.accepted.key == right
+    assert [item.key for item in first.choice.aliases] == [right] and first.choice.rivals[0].key == right
+    assert sum(first.choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
+    again = exchanged(bench.base, current, told, kept, LEVEL, rng)
+    assert again[2] == kept and again[0] is current
+
+
+def test_gravity_that_is_added_does_not_change_over_what_time_runs_are_judged(tmp_path: Path) -> None:
+    """It would hold a drive that drifts; the file of the augmented model states the time, for whoever repeats it."""
+    path = write_case(tmp_path, axis())
+    model = prepare(load_problem(path))
+    drive = model.problem.drive
+    heavy = replace(drive, shafts=(replace(drive.shafts[0], gravity=Gravity(0.01, 0.3)),))
+    span = horizon(model)
+    assert span is not None and horizon(with_drive(model, heavy)) is None
+    alike = with_drive(judged_alike(model), heavy)
+    assert horizon(alike) == span and fits_free_run(alike) == fits_free_run(model)
+    (tmp_path / "augmented.yaml").write_text(write_problem(path, heavy, {}, tmp_path, horizon_s=span))
+    assert load_problem(tmp_path / "augmented.yaml").estimation.horizon_s == pytest.approx(span)
+
+
+@pytest.mark.slow
+def test_bristles_are_found_with_their_damping(tmp_path: Path) -> None:
+    """A contact that gives way by a tenth of a radian, a third damped: stiffness and damping are those of the plant."""
+    stiffness = 10.0 * COULOMB
+    damping = 0.6 * float(np.sqrt(stiffness * INERTIA))
+    law = PlantFriction("lugre", tau_c=COULOMB, viscous=VISCOUS, sigma0=stiffness, sigma1=damping)
+    plant = axis()
+    plant = replace(plant, shafts=(replace(plant.shafts[0], friction=law),))
+    path = write_case(tmp_path, plant, effects=("presliding", "stribeck", "drive_lag", "unbalance"))
+    found = diagnose(load_problem(path))
+    assert found.accepted == (("presliding", "motor"),) and found.verdict == "explained"
+    assert found.final.values["motor.friction.bristle.sigma0"] == pytest.approx(stiffness, rel=0.05)
+    assert found.final.values["motor.friction.bristle.sigma1"] == pytest.approx(damping, rel=0.1)
