@@ -17,6 +17,7 @@ from friction_ocp.estimation.division import cut_where_they_grow
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.simulation.grid import FloatArray
 
 EASY = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=25)
@@ -41,7 +42,11 @@ def widened(program: Program, factor: float) -> Program:
 
 
 def eased(program: Program, point: Point, factor: float) -> Point:
-    """Return where gaps wider by a factor lead to from a start, narrowed down to those of the program."""
+    """Return where gaps wider by a factor lead to from a start, narrowed down to those of the program.
+
+    The nodes settle before the parameters move: those of a start bear what the model before it lacked.
+    """
+    point = solve_nodes(widened(program, factor), point)
     while factor > NARROWING:
         point = solve_gauss_newton(widened(program, factor), point, EASY).point
         factor /= NARROWING
