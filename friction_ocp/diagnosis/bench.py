@@ -187,13 +187,17 @@ class Crew:
         found = [self._screened(value) for value in values if value is not None]
         return sorted(found, key=lambda item: -item.gain)
 
-    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[FittedModel]]:
-        """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps."""
+    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[tuple[Screened, FittedModel]]]:
+        """Return (blocks,) held-out costs of the current model, and candidates with their refits after a few steps.
+
+        Candidates whose simulation breaks down on the way are left out.
+        """
         tasks = [Task(f"{self.number}-held-out", held_out_costs)]
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
         costs, *points = self._run("refits", tasks, 0.5)
         pairs = zip(shortlist, points, strict=True)
-        return restored(costs), [seat_candidate(self.bench, item, point) for item, point in pairs]
+        seen = [(item, seat_candidate(self.bench, item, point)) for item, point in pairs if point is not None]
+        return restored(costs), seen
 
     def rivals(self, tried: Sequence[tuple[Screened, FittedModel]], without: FloatArray) -> list[Rival]:
         """Return candidates whose refits are completed, with what they gain on recordings left out."""
@@ -242,8 +246,9 @@ def held_out_costs(bench: Bench) -> Json:
 
 
 def refit_candidate(bench: Bench, content: Json) -> Json:
-    """Refit a candidate, a few steps."""
-    return point_document(quick_refit(bench.current, restored_screened(bench, content)))
+    """Refit a candidate, a few steps; null where its simulation breaks down."""
+    fitted = quick_refit(bench.current, restored_screened(bench, content))
+    return point_document(fitted) if fitted.holds else None
 
 
 def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:

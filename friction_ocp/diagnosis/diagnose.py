@@ -289,11 +289,13 @@ def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
     if not chosen:
         return
     without, refits = crew.without(chosen)
+    if not refits:
+        return
     current = crew.bench.current
-    hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in zip(chosen, refits, strict=True)]
+    hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in refits]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
     order = sorted(range(len(hopes)), key=lambda k: hopes[k])
-    pairs = [(chosen[k], refits[k]) for k in order]
+    pairs = [refits[k] for k in order]
     rivals = crew.rivals(pairs[:count], without)
     yield rivals
     if len(pairs) > count:
