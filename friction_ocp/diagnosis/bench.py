@@ -12,14 +12,9 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import (
-    FittedModel,
-    completed,
-    fit_base,
-    held_out,
-    quick_refit,
-)
+from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
 from friction_ocp.diagnosis.footing import Footing, training_pieces
+from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.select import Rival

@@ -71,8 +71,7 @@ class Contrast:
         nodes = np.zeros((item.cut.count, len(names)))
         extra = np.setdiff1d(np.arange(len(names)), shared)
         if extra.size:
-            first = int(item.cut.first[0])
-            at = (own.smooth[first], own.rate[first], own.curvature[first], own.grid.at_node[first])
+            at = own.signals(int(item.cut.first[0]))
             nodes[0] = np.asarray(self.sweep.start.call([*at, numbers])[0]).ravel()
         nodes[:, shared] = item.nodes
         request = SweepRequest(own.grid, item.cut.first, nodes, numbers, width)

@@ -5,26 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
-from typing import Any
 
 import casadi as ca
 import numpy as np
-import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.diagnosis.gathered_noise import alike, motions_of, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel, Motor
-from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.experiment import COLUMNS, Experiment
 from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
-from friction_ocp.estimation.model import Model, seen_by, slopes_at, typical_inputs
+from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program, Segments
 from friction_ocp.estimation.stages import windows
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
-
-linalg: Any = _linalg  # its own types are incomplete
 
 FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
@@ -42,10 +39,6 @@ NUMERICAL_INPUT = 1e-3
 """Error of a measured input over its rms, sample by sample, that a simulation between samples makes anyway."""
 SMOOTH = 4.0 * np.sqrt(6.0)
 """Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
-ALIKE = 0.01
-"""Relative difference of lengths of segments whose gaps are equally wide: the noise is not known better."""
-MOVES_ALIKE = float(np.log(2.0))
-"""The same for speeds and deflections, logarithms: what matters is whether bristles hold or slip."""
 NEGLIGIBLE_GAP = 0.1
 """Gap over the noise floor that stands for a state that no noise enters."""
 
@@ -115,7 +108,7 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
     for begin, end in pairwise(edges):
         at = slice(begin, end + 1)
         grid = replace(item.grid, **{part.name: getattr(item.grid, part.name)[at] for part in fields(item.grid)})
-        kept = {name: getattr(item, name)[at] for name in ("measured", "smooth", "rate", "curvature", "lost")}
+        kept = {name: getattr(item, name)[at] for name in COLUMNS}
         found.append(replace(item, grid=grid, **kept))
     return found
 
@@ -204,43 +197,6 @@ def group_density(model: Model, foot: Footing, recording: str) -> FloatArray:
     return acceleration_noise(mech, foot.density, values)
 
 
-def unit_covariances(model: Model, foot: Footing, recording: str, spans: FloatArray, at: FloatArray) -> FloatArray:
-    """Return (groups, spans, states, states) what unit acceleration noise of each group gathers over each span, s.
-
-    About the states `at` (spans, states) and without dry friction.
-    """
-    mech = model.drive.mechanism
-    numbers = _known_numbers(model, foot, recording)
-    values = np.array([numbers[name] for name in model.space.leaf_names])
-    slopes = slopes_at(model.drive, values, typical_inputs(model.problem, model.drive), list(at))
-    states = at.shape[1]
-    found = np.zeros((len(mech.topology.roots), spans.size, states, states))
-    for k, group in enumerate(mech.free_groups):
-        power = np.zeros((states, states))
-        power[len(mech.angle_groups) + k, len(mech.angle_groups) + k] = 1.0
-        for j, (span, slope) in enumerate(zip(spans, slopes, strict=True)):
-            found[group, j] = _gathered(slope, power, float(span))
-    return found
-
-
-def _gathered(slope: FloatArray, power: FloatArray, span: float) -> FloatArray:
-    """Return P after a span, s, from dP/dt = A P + P A' + power, P = 0, with A the slope.
-
-    Over a short span by one exponential (Van Loan 1978), which overflows where something decays fast, then doubled:
-    P(2 t) = P(t) + e^(A t) P(t) e^(A' t).
-    """
-    states, size = slope.shape[0], float(np.linalg.norm(slope, 1)) * span
-    doublings = max(0, int(np.ceil(np.log2(max(size, 1.0)))))
-    whole = np.block([[-slope, power], [np.zeros_like(slope), slope.T]])
-    wide = np.asarray(linalg.expm(whole * span / 2**doublings), dtype=np.float64)
-    carried = wide[states:, states:].T
-    found = carried @ wide[:states, states:]
-    for _ in range(doublings):
-        found = found + carried @ found @ carried.T
-        carried = carried @ carried
-    return 0.5 * (found + found.T)
-
-
 def gap_roots(
     model: Model,
     foot: Footing,
@@ -260,44 +216,12 @@ def gap_roots(
     still = still_gaps(model, foot, item.name, float(np.median(spans)))
     if spans.size < 2:
         return np.zeros((0, still.size, still.size))
-    distinct, motions, which = alike(spans, motions_of(model, foot, item, (first[:-1] + first[1:]) // 2))
-    units = unit_covariances(model, foot, item.name, distinct, motions)
+    numbers = _leaf_numbers(model, foot, item.name)
+    distinct, motions, which = alike(spans, motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2))
+    units = unit_covariances(model, numbers, distinct, motions)
     power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
     covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
-
-
-def motions_of(model: Model, foot: Footing, item: Experiment, nodes: IntArray) -> FloatArray:
-    """Return (nodes, states) the motion at some nodes, angles and all that does not rub left at zero.
-
-    A shaft that slides is not held by its bristles: torque noise moves it farther than one at rest. Without bristles
-    all motion is alike.
-    """
-    mech, states = model.drive.mechanism, np.zeros((nodes.size, len(model.drive.state_names)))
-    if not mech.bristles:
-        return states
-    numbers = _known_numbers(model, foot, item.name)
-    values = np.array([numbers[name] for name in model.space.leaf_names])
-    signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
-    found, _ = model.sweep.start.map(nodes.size)(*(signal[nodes].T for signal in signals), values)
-    angles = len(mech.angle_groups)
-    rubbing = slice(angles, angles + len(mech.free_groups) + len(mech.bristle_names))
-    states[:, rubbing] = np.asarray(found).T[:, rubbing]
-    return states
-
-
-def alike(spans: FloatArray, motions: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return mean spans and motions of groups that differ little, and the group of each: covariances take time.
-
-    Spans differ by ALIKE, motions (spans, states) by MOVES_ALIKE.
-    """
-    sizes = np.round(np.log(np.maximum(np.abs(motions), 1e-12)) / MOVES_ALIKE) * np.sign(motions)
-    keys = np.column_stack([np.round(np.log(spans) / ALIKE), sizes])
-    _, which = np.unique(keys, axis=0, return_inverse=True)
-    which = which.ravel().astype(np.int64)
-    count = np.bincount(which)
-    means = np.column_stack([np.bincount(which, column) / count for column in motions.T])
-    return np.bincount(which, spans) / count, means, which
 
 
 def _jump_power(
@@ -313,6 +237,12 @@ def _jump_power(
         ratio = speed_ratio(model, foot, item.name, shaft) / max(float(inertias[group]), 1e-300)
         power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
     return power
+
+
+def _leaf_numbers(model: Model, foot: Footing, recording: str) -> FloatArray:
+    """Return the numbers of the drive in the order of the model functions."""
+    numbers = _known_numbers(model, foot, recording)
+    return np.array([numbers[name] for name in model.space.leaf_names])
 
 
 def _known_numbers(model: Model, foot: Footing, recording: str) -> dict[str, float]:
@@ -380,7 +310,8 @@ def _segment_length(model: Model, foot: Footing, item: Experiment) -> float:
 
 def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray:
     """Return (quarters, states) a motion of rms speed; rest where no bristle tells it from any other."""
-    moves = motions_of(model, foot, item, np.arange(item.grid.time.size, dtype=np.int64))
+    numbers = _leaf_numbers(model, foot, item.name)
+    moves = motions_of(model, numbers, item, np.arange(item.grid.time.size, dtype=np.int64))
     speeds = moves[:, len(model.drive.mechanism.angle_groups) :][:, : len(model.drive.mechanism.free_groups)]
     power: FloatArray = np.sum(speeds**2, axis=1)
     return np.tile(moves[int(np.argmin(np.abs(power - np.mean(power))))], (QUARTERS.size, 1))
@@ -389,7 +320,8 @@ def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray
 def _within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
     """Return (outputs,) the mean variance that torque noise adds between the start and end of a segment."""
     mech = model.drive.mechanism
-    units = unit_covariances(model, foot, item.name, seconds * QUARTERS, _typical_motion(model, foot, item))
+    numbers, motion = _leaf_numbers(model, foot, item.name), _typical_motion(model, foot, item)
+    units = unit_covariances(model, numbers, seconds * QUARTERS, motion)
     covariances: FloatArray = np.einsum("g,gsij->sij", group_density(model, foot, item.name) ** 2, units)
     added = np.zeros(len(mech.drive.outputs))
     for k, channel in enumerate(mech.drive.outputs):

@@ -62,8 +62,7 @@ def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> f
         return innovations(base).ratio
     model = with_drive(base.model, with_additions(base, keys))
     known = {**base.values, **final.values}
-    theta = np.array([known.get(name, guess) for name, guess in zip(model.space.names, model.space.guess, strict=True)])
-    fitted = polished(model, base.footing, theta, None)
+    fitted = polished(model, base.footing, model.space.with_known(known), None)
     return innovations(fitted).ratio if fitted.holds else np.inf
 
 

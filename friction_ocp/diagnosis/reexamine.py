@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from friction_ocp.diagnosis.bench import blocks_like
-from friction_ocp.diagnosis.blocks import blocks_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, held_out, polished, without_addition
+from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, without_addition
+from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.select import Choice, Rival, Round, resamples
 from friction_ocp.diagnosis.worth import Key, required
@@ -27,14 +29,15 @@ def without_superfluous(
 
     Superfluous is what neither gains for certain there nor is worth an addition in sum.
     """
+    benchmark = _Benchmark(current)
     for key in dict.fromkeys(accepted[:-1]):
         kept = [other for other in accepted if other != key]
         simpler = without_addition(current, with_additions(base, kept))
         if not simpler.holds:
             continue
-        gains = _dearer(simpler, current)
-        if not _certain(current, gains, level, rng) and float(np.sum(gains)) < required(base, simpler):
-            current, accepted = simpler, kept
+        gains = benchmark.dearer(simpler)
+        if not benchmark.certain(gains, level, rng) and float(np.sum(gains)) < required(base, simpler):
+            current, accepted, benchmark = simpler, kept, _Benchmark(simpler)
     return current, accepted
 
 
@@ -50,7 +53,7 @@ def exchanged(
 
     Alone they were further off: two effects are more than each of them, and what is nearest to both is neither.
     """
-    done = list(rounds)
+    done, benchmark = list(rounds), _Benchmark(current)
     for index, item in enumerate(done[:-1]):
         key = item.accepted.key if item.accepted is not None else None
         if key is None or accepted.count(key) != 1:
@@ -58,8 +61,8 @@ def exchanged(
         for rival in _others(item.choice, accepted):
             keys = [rival.key if other == key else other for other in accepted]
             swapped = _fitted(base, current, rival, keys)
-            if swapped.cost < current.cost and _certain(current, -_dearer(swapped, current), level, rng):
-                current, accepted = swapped, keys
+            if swapped.cost < current.cost and benchmark.certain(-benchmark.dearer(swapped), level, rng):
+                current, accepted, benchmark = swapped, keys, _Benchmark(swapped)
                 done[index] = replace(item, accepted=rival, choice=_turned(item.choice, rival))
                 break
     return current, done, accepted
@@ -74,19 +77,30 @@ def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequenc
     """Fit the base model with some additions, from where the rival ended and what the later ones are now."""
     model = with_drive(base.model, with_additions(base, keys))
     known = {**current.values, **rival.fitted.values}
-    theta = np.array([known.get(name, guess) for name, guess in zip(model.space.names, model.space.guess, strict=True)])
-    return completed(polished(model, base.footing, theta, None))
+    return completed(polished(model, base.footing, model.space.with_known(known), None))
 
 
-def _dearer(other: FittedModel, current: FittedModel) -> FloatArray:
-    """Return (blocks,) what another model costs more on recordings left out than the current one, in its blocks."""
-    blocks = blocks_of(current.linear.rows)
-    return blocks_like(current, other, blocks) - blocks.sums(held_out(current))
+@dataclass(frozen=True)
+class _Benchmark:
+    """A model that others are compared with on recordings left out; it is looked at once."""
 
+    fitted: FittedModel
 
-def _certain(current: FittedModel, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
-    """Whether gains in the blocks of the current model are more than chance makes of nothing."""
-    return bool(np.quantile(resamples(blocks_of(current.linear.rows), rng) @ gains, level) > 0)
+    @cached_property
+    def _blocks(self) -> Blocks:
+        return blocks_of(self.fitted.linear.rows)
+
+    @cached_property
+    def _costs(self) -> FloatArray:
+        return self._blocks.sums(held_out(self.fitted))
+
+    def dearer(self, other: FittedModel) -> FloatArray:
+        """Return (blocks,) what another model costs more than this one."""
+        return blocks_like(self.fitted, other, self._blocks) - self._costs
+
+    def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
+        """Whether gains in the blocks of this model are more than chance makes of nothing."""
+        return bool(np.quantile(resamples(self._blocks, rng) @ gains, level) > 0)
 
 
 def _turned(choice: Choice, rival: Rival) -> Choice:

@@ -9,7 +9,8 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.excess import Excess
-from friction_ocp.diagnosis.fitting import FittedModel, folds
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 

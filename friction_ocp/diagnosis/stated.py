@@ -8,7 +8,8 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import blocks_like
 from friction_ocp.diagnosis.blocks import blocks_of, stats
-from friction_ocp.diagnosis.fitting import FittedModel, freed, held_out, polished
+from friction_ocp.diagnosis.fitting import FittedModel, freed, polished
+from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Choice, Rival
 from friction_ocp.drive.parts import Drive

@@ -115,43 +115,37 @@ def _motor_at(drive: Drive, shaft: str) -> Motor:
     return motor
 
 
-class CoggingEffect(AbstractWaveEffect):
+class AbstractMotorWaveEffect(AbstractWaveEffect):
+    """A wave over the angle of a motor, in the field of the motor that has the effect's name."""
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        return [name for name, motor in _driven(drive).items() if getattr(motor, self.name) is None]
+
+    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
+        motor = _motor_at(drive, place)
+        return getattr(motor, self.name), f"{motor.name}.{self.name}"
+
+    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
+        return change_motor(drive, _motor_at(drive, place).name, **{self.name: part})
+
+
+class CoggingEffect(AbstractMotorWaveEffect):
     """Torque periodic in the motor angle."""
 
     name: ClassVar[str] = "cogging"
     sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
     kind: ClassVar[type[Wave]] = Cogging
 
-    def places(self, drive: Drive) -> Iterable[str]:
-        return [name for name, motor in _driven(drive).items() if motor.cogging is None]
-
-    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
-        motor = _motor_at(drive, place)
-        return motor.cogging, f"{motor.name}.cogging"
-
-    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
-        return change_motor(drive, _motor_at(drive, place).name, cogging=part)
-
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE * clues.typical_torque[place], clues.periods(place, "theta")
 
 
-class TorqueRippleEffect(AbstractWaveEffect):
+class TorqueRippleEffect(AbstractMotorWaveEffect):
     """Torque periodic in the motor angle and proportional to current."""
 
     name: ClassVar[str] = "torque_ripple"
     sentence: ClassVar[str] = "the motor's torque ripples with its angle, in proportion to the current"
     kind: ClassVar[type[Wave]] = TorqueRipple
-
-    def places(self, drive: Drive) -> Iterable[str]:
-        return [name for name, motor in _driven(drive).items() if motor.torque_ripple is None]
-
-    def there(self, drive: Drive, place: str) -> tuple[Any, str]:
-        motor = _motor_at(drive, place)
-        return motor.torque_ripple, f"{motor.name}.torque_ripple"
-
-    def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
-        return change_motor(drive, _motor_at(drive, place).name, torque_ripple=part)
 
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE, clues.periods(place, "theta", against_torque=_motor_at(drive, place).name)

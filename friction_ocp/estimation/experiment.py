@@ -17,10 +17,14 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.recording.conditioning import high_frequency_noise, smooth_motion
 from friction_ocp.recording.recording import Recording
-from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, build_grid
+from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, IntArray, build_grid
 
 STILL, NOISE_OF_REST = 1e-3, 3.0
 """Share of the greatest speed, and standard deviations of its noise, up to which a prescribed speed has no sign."""
+
+
+COLUMNS = ("measured", "smooth", "rate", "curvature", "lost")
+"""What an experiment holds of every output at every node."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,10 @@ class Experiment:
     """(n, outputs) where there was a sample before late channels were read earlier, and is none now."""
     late: Mapping[str, float] = field(default_factory=dict[str, float])
     """By channel: the part of its delay, s, that is undone by reading its samples earlier."""
+
+    def signals(self, nodes: IntArray | int | slice) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return what makes a state of the measurement: smoothed outputs, two derivatives of them, and inputs."""
+        return self.smooth[nodes], self.rate[nodes], self.curvature[nodes], self.grid.at_node[nodes]
 
 
 def known_delay(channel: Channel) -> float:

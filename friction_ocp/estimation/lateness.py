@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.experiment import COLUMNS, Experiment
 from friction_ocp.simulation.grid import FloatArray
 
 UNEVEN = 0.05
@@ -42,15 +42,14 @@ def read_earlier(item: Experiment, names: Sequence[str], late: Mapping[str, floa
     steps = [round((late.get(name, 0.0) - item.late.get(name, 0.0)) / interval) for name in names]
     if not any(steps):
         return item
-    columns = {key: getattr(item, key).copy() for key in ("measured", "smooth", "rate", "curvature", "lost")}
-    for k, step in enumerate(s for s in steps):
-        if step:
-            was = np.isfinite(item.measured[:, k]) | item.lost[:, k]
-            columns["measured"][:, k] = _shifted(item.measured[:, k], step, np.nan)
-            columns["lost"][:, k] = was & ~np.isfinite(columns["measured"][:, k])
-            for key in ("smooth", "rate", "curvature"):
-                column = getattr(item, key)[:, k]
-                columns[key][:, k] = _shifted(column, step, column[-1 if step > 0 else 0])
+    columns = {key: getattr(item, key).copy() for key in COLUMNS}
+    for k, step in enumerate(steps):
+        beyond = -1 if step > 0 else 0
+        for key in ("smooth", "rate", "curvature"):
+            columns[key][:, k] = _shifted(columns[key][:, k], step, columns[key][beyond, k])
+        columns["measured"][:, k] = _shifted(columns["measured"][:, k], step, np.nan)
+    had = np.isfinite(item.measured) | item.lost
+    columns["lost"] = np.where(np.array(steps) != 0, had & ~np.isfinite(columns["measured"]), item.lost)
     return replace(item, **columns, late={name: value for name, value in late.items() if name in names})
 
 
@@ -69,8 +68,6 @@ def _fits(time: FloatArray, seconds: float, interval: float) -> bool:
 def _shifted(column: FloatArray, step: int, beyond: float) -> FloatArray:
     """Return a column whose row i is row i + step of another; `beyond` where that has none."""
     found = np.full_like(column, beyond)
-    if step > 0:
-        found[:-step] = column[step:]
-    else:
-        found[-step:] = column[:step]
+    kept = column.size - abs(step)
+    found[max(-step, 0) :][:kept] = column[max(step, 0) :][:kept]
     return found

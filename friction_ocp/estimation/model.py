@@ -249,7 +249,7 @@ def _signals(problem: Problem, name: str) -> list[tuple[FloatArray, FloatArray]]
 
 def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment) -> FloatArray:
     numbers = space.numbers(space.guess, item.name)
-    signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
+    signals = item.signals(slice(None))
     value, _ = sweep.start.map(item.grid.time.size)(*(signal.T for signal in signals), numbers)
     return np.asarray(value).T
 

@@ -63,6 +63,10 @@ class ParameterSpace:
                 array.flags.writeable = False
         return known[1], known[2]
 
+    def with_known(self, known: Mapping[str, float]) -> FloatArray:
+        """Return values that are known by name, and the guess of every other parameter."""
+        return np.array([known.get(name, guess) for name, guess in zip(self.names, self.guess, strict=True)])
+
     def clip(self, theta: FloatArray) -> FloatArray:
         """Return the nearest point inside the bounds."""
         return np.clip(theta, self.lower, self.upper)
@@ -136,9 +140,7 @@ def _table(
             table[path] = value
     table |= {name: symbol for name, symbol in symbols.items() if name not in table}
     resolved = resolve_ties(ties, table)
-    if isinstance(
-        use, RecordingUse
-    ):  # stamps that were moved, samples that are read earlier leave the rest to the model
+    if isinstance(use, RecordingUse):  # what is undone in the recording already is not the model's to do
         for channel, seconds in use.late.items():
             resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds
         for clock, gone in use.moved.items():

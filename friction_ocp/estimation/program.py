@@ -134,8 +134,7 @@ class Program:
             return np.zeros((len(nodes), states)), np.zeros((len(nodes), states, theta.size))
         numbers, slope = self.space.numbers_and_slope(theta, item.name)
         many = self.sweep.start.map(len(nodes))
-        signals = (item.smooth, item.rate, item.curvature, item.grid.at_node)
-        value, by_active = many(*(signal[nodes].T for signal in signals), numbers)
+        value, by_active = many(*(signal.T for signal in item.signals(nodes)), numbers)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
             return np.asarray(value).T, by_active @ slope
@@ -163,10 +162,8 @@ class Program:
     @cached_property
     def _starting(self) -> tuple[ca.Function, tuple[FloatArray, ...]]:
         """The start states of all measured nodes as one function, and their signals, one column a node."""
-        columns: list[list[FloatArray]] = []
-        for item, cut in zip(self.experiments, self.segments, strict=True):
-            at = cut.first[: cut.measured]
-            columns.append([signal[at] for signal in (item.smooth, item.rate, item.curvature, item.grid.at_node)])
+        pairs = zip(self.experiments, self.segments, strict=True)
+        columns = [item.signals(cut.first[: cut.measured]) for item, cut in pairs]
         signals = tuple(np.concatenate(signal).T for signal in zip(*columns, strict=True))
         return self.sweep.start.map(sum(cut.measured for cut in self.segments)), signals
 
@@ -230,6 +227,14 @@ class Program:
     def sample_errors(self, index: int, y: FloatArray) -> FloatArray:
         """Return (n, outputs) errors over the noise floor, zero where there is no sample."""
         return np.where(np.isfinite(self.experiments[index].measured), self.residuals(index, y), 0.0)
+
+    def lost_costs(self, index: int) -> FloatArray:
+        """Return (n, outputs) what noise costs for each sample that lies outside of the recording where it is read.
+
+        Without it, reading a late channel earlier would look like a gain.
+        """
+        one = float(self.loss.cost(np.ones(1))[0])
+        return np.where(self.experiments[index].lost, one, 0.0)
 
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""

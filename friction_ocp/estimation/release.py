@@ -26,7 +26,7 @@ def released(model: Model, simple: ParameterSpace, theta: FloatArray) -> list[Fl
     hang on it. The guess is one more start where it lies far from all of these.
     """
     known = dict(zip(simple.names, theta, strict=True))
-    guess = np.array([known.get(name, model.space.guess[k]) for k, name in enumerate(model.space.names)])
+    guess = model.space.with_known(known)
     shares = SHARES if any(".tau_s" in name for name in model.space.names) else SHARES[:1]
     starts: list[FloatArray] = []
     for place, highest_break in RELEASES:

@@ -82,8 +82,7 @@ def _placed(matrix: FloatArray, names: tuple[str, ...], wanted: tuple[str, ...])
 def _linear(fitted: FittedModel, recording: Recording) -> LinearProgram:
     """Return the fitted model's program of a recording at its parameters, its states those that fit best."""
     model = prepare(_problem(fitted, recording))
-    guesses = dict(zip(model.space.names, map(float, model.space.guess), strict=True))
-    theta = np.array([fitted.values.get(name, guess) for name, guess in guesses.items()])
+    theta = model.space.with_known(fitted.values)
     foot = replace(footing(model, theta), segment_s=fitted.footing.segment_s)
     program = foot.program(model, model.train)
     freely = free_run(model, model.train, 0.0, Squares(), None)

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
-from friction_ocp.diagnosis.footing import footing, unit_covariances
+from friction_ocp.diagnosis.gathered_noise import unit_covariances
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.problem_file.load import load_problem
 
@@ -32,8 +32,7 @@ def bristled(tmp_path_factory: pytest.TempPathFactory) -> Model:
 def covariance(model: Model, span: float, omega: float, bent: float) -> np.ndarray:
     """Return what unit acceleration noise gathers in angle, speed and deflection over a span, s."""
     at = np.array([[0.0, omega, bent]])
-    foot = footing(model, model.space.guess)
-    return unit_covariances(model, foot, "a", np.array([span]), at)[0, 0]
+    return unit_covariances(model, model.space.numbers(model.space.guess, "a"), np.array([span]), at)[0, 0]
 
 
 def test_at_rest_the_bristle_holds_the_shaft(bristled: Model) -> None:

@@ -12,7 +12,8 @@ from diagnosis_cases import VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base, held_out
+from friction_ocp.diagnosis.fitting import FittedModel, fit_base
+from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare

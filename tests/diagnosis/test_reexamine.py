@@ -13,7 +13,8 @@ from plant import PlantFriction, PlantRipple
 from friction_ocp.diagnosis.bench import Bench, blocks_like, judged_alike, open_bench, screen
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import completed, held_out, quick_refit
+from friction_ocp.diagnosis.fitting import completed, quick_refit
+from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.reexamine import exchanged
 from friction_ocp.diagnosis.select import Rival, Round, choose
 from friction_ocp.diagnosis.worth import Key
