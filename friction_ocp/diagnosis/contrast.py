@@ -14,7 +14,7 @@ from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray
-from friction_ocp.simulation.kernel import SweepRequest, empty_result
+from friction_ocp.simulation.kernel import Piece, SweepRequest, empty_result
 from friction_ocp.simulation.sweep import Sweep
 
 
@@ -78,11 +78,11 @@ class Contrast:
         result = empty_result(request, len(names), len(self.sweep.drive.output_names), 0)
         if extra.size:
             for j in range(item.cut.count):
-                self.sweep.kernel.run(request, j, j + 1, result)
+                self.sweep.kernel.run([Piece(request, j, j + 1, result)])
                 if j + 1 < item.cut.count:
                     nodes[j + 1, extra] = result.end[j, extra]
         else:
-            self.sweep.kernel.run(request, 0, item.cut.count, result)
+            self.sweep.kernel.run([Piece(request, 0, item.cut.count, result)])
         return result.y, result.end[:, shared], nodes
 
 

@@ -1,4 +1,4 @@
-"""The maps of a drive looped in CasADi's virtual machine: the same answers as native code, about 20 times slower."""
+"""The maps of a drive looped in CasADi's virtual machine: the same answers as native code, far slower."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray, Grid, IntArray
-from friction_ocp.simulation.kernel import AbstractKernel, SweepRequest, SweepResult
+from friction_ocp.simulation.kernel import AbstractKernel, Piece, SweepRequest, SweepResult
 from friction_ocp.simulation.maps import delay_indices, sweep_maps
 from friction_ocp.simulation.scoring import add_score
 
@@ -69,7 +69,11 @@ class InterpretedKernel(AbstractKernel):
         self._fold = cache(self._new_fold)
         self._output = cache(self._new_output)
 
-    def run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
+    def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
+        for piece in pieces:
+            self._run(piece.request, piece.begin, piece.stop, piece.into)
+
+    def _run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
         tracks: list[FloatArray] = []
         instants: list[FloatArray] = []
         for j in range(begin, stop):

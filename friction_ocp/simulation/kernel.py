@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -72,18 +72,30 @@ class SweepResult:
     """Where there is a yardstick."""
 
 
+@dataclass(frozen=True)
+class Piece:
+    """Segments `begin` .. `stop` - 1 of a request, and the result that they belong to."""
+
+    request: SweepRequest
+    begin: int
+    stop: int
+    into: SweepResult
+    """Its `dend` is a view of memory in the order (segments, columns, states)."""
+
+    @property
+    def steps(self) -> IntArray:
+        """(segments,) how many integrator steps each segment takes."""
+        first = self.request.first[self.begin : self.stop + 1]
+        before = np.concatenate([[0], np.cumsum(self.request.grid.substeps)])
+        return np.diff(before[first])
+
+
 class AbstractKernel(ABC):
     """Computes sweeps of one drive."""
 
-    parallel: ClassVar[bool] = False
-    """Whether several threads may run it, and gain from that."""
-
     @abstractmethod
-    def run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
-        """Simulate segments `begin` .. `stop` - 1 of a request and write their rows of `into`.
-
-        `into.dend` is (segments, states, columns) as a view of memory in the order (segments, columns, states).
-        """
+    def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
+        """Simulate pieces and write their rows of their results, in several threads where that helps."""
 
 
 def empty_result(request: SweepRequest, states: int, outputs: int, active: int) -> SweepResult:

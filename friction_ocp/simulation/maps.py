@@ -47,15 +47,14 @@ class SweepMap:
         )
 
     def derivative(self, active: Sequence[int]) -> ca.Function:
-        """Return (arguments, torques) -> value, Jacobian by state, Jacobian by active parameters, all dense.
+        """Return (arguments, torques) -> value, Jacobian by state, Jacobian by active parameters, these two sparse.
 
         The torques move with state and parameters as the implicit function theorem says.
         """
         by_state = self._total(self.arguments[0])
         by_active = self._total(ca.vertcat(*[self.arguments[2][k] for k in active]))
-        return self._function(
-            f"{self.name}_d", [self.torques] if self.unknowns else [], [self.value, by_state, by_active]
-        )
+        arguments = [*self.arguments, *([self.torques] if self.unknowns else [])]
+        return ca.Function(f"{self.name}_d", arguments, [ca.densify(self.value), by_state, by_active], {"cse": True})
 
     def solved(self, active: Sequence[int] | None, newton_steps: int) -> ca.Function:
         """Return (arguments, torques to start from) -> value, torques and, by `active`, the two Jacobians.
@@ -71,7 +70,8 @@ class SweepMap:
             after = [*self.arguments, torques, constants]
         values = [value.call(after, True, False)[0], torques]
         if active is not None:
-            values += self.derivative(active).call(after[: len(self.arguments) + bool(self.unknowns)], True, False)[1:]
+            slopes = self.derivative(active).call(after[: len(self.arguments) + bool(self.unknowns)], True, False)[1:]
+            values += [ca.densify(slope) for slope in slopes]
         return ca.Function(f"{self.name}_s", [*self.arguments, self.torques], values, {"cse": True})
 
     def _total(self, by: ca.SX) -> ca.SX:

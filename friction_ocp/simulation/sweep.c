@@ -1,120 +1,117 @@
-/* Loop of the generated maps of a drive over the samples of segments, with forward sensitivities.
+/* Loop of the generated maps of a drive over the samples of segments, with forward sensitivities, LANES segments at
+   once (lanes.h).
 
-   Above this text stand the code that CasADi generated from maps.py and the sizes
-     NX NU NP NA NY            states, inputs, parameters, active parameters, outputs;
+   Above this text stand lanes.h, the code of the maps (lane_code.py, from maps.py) and the sizes
+     NX NU NP NW NA NY         states, inputs, parameters, widths, active parameters, outputs;
+     NC                        columns of sensitivities: the state at the segment's start, then the active parameters;
      NL NK                     most unknown torques, and constants of their equations, of any map;
-     SZ_ARG SZ_RES SZ_IW SZ_W  work space that suffices for every generated function;
    then a table of the maps (STEP, OUTPUT and, where there are any, TICK and NOW) and the list DELAYS of the
    parameters that must be 0 for NOW to replace OUTPUT.
    Each map has the functions of maps.py: for unknown torques, if any, the constants of their equations and one step
-   of Newton's method; the value; the value with its Jacobians by state and by active parameters, column major.
-   Sensitivities have NC = NX + NA columns: the state at the segment's start, then the active parameters.
+   of Newton's method; the value; the value with the nonzeros of its Jacobians by state and by active parameters; and
+   what multiplies these with sensitivities.
    Nothing here is static: calls from several threads at once are safe. */
 
-#define NC (NX + NA)
-#define SQUARE (NC * NC)
 #define NEWTON_LIMIT 15
 #define NEWTON_TOLERANCE 1e-8 /* of the last correction; Newton's method squares it */
 
+/* One segment: its grid, inputs, parameters and start; what it is compared with; where its results go. Pointers are at
+   its first node. The closing node is the next segment's first: only the last segment, which `closes` its recording,
+   ticks and writes it.
+   Samples (n x NY, NaN where there is none), noise floors and the loss, its kind and parameter (kernel.py), or NULL.
+   course (n x NX, states before the ticks of a node), states (n x NX, after them), y (n x NY) and dy (n x NY x NC) may
+   be NULL; end (NX), dend (NX x NC, column major) with sensitivities; cost, gradient (NC) and square (NC x NC) where
+   there is something to compare with. */
 typedef struct {
-  double w[SZ_W];
-  casadi_int iw[SZ_IW];
-  const double *arg[SZ_ARG];
-  double *res[SZ_RES];
-  double value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], moved[(NX + NY) * NC + 1];
-  double step_torques[NL + 1], output_torques[NL + 1], constants[NK + 1];
-} work_space;
-
-/* What a sweep is compared with: samples (n x NY, NaN where there is none) at the first node of a segment, their noise
-   floors, and the loss by kind and parameter (kernel.py). */
-typedef struct {
-  const double *measured, *noise;
-  int loss;
-  double parameter;
-} yardstick;
-
-/* Where the comparison is summed over a segment: cost and, with sensitivities, gradient (NC) and the lower triangle of
-   the Gauss-Newton Hessian (NC x NC, row major). */
-typedef struct {
-  double cost, *gradient, *square;
-} score;
-
-/* Grid, inputs and parameters of a segment; all pointers at its first node. */
-typedef struct {
-  long n;
+  long n, closes;
   const double *dt;
   const long *substeps, *ticks;
   const double *u0, *u1, *un;
-  const double *p, *width;
+  const double *p, *width, *x0;
+  const double *measured, *noise, *loss;
+  double *course, *states, *y, *dy, *end, *dend, *cost, *gradient, *square;
+} segment;
+
+/* Segments side by side: lane i belongs to at[i]; lanes from `live` on repeat the first. */
+typedef struct {
+  const segment *at[LANES];
   const map *output;
-} course;
+  int live, derivatives;
+  lanes x[NX + 1], s[NX * NC + 1], u[NU + 1], p[NP + 1], width[NW + 1], h, step_torques[NL + 1], output_torques[NL + 1];
+  lanes cost, gradient[NC + 1], square[NC * NC + 1];
+  const lanes *arg[7];
+  lanes *res[3];
+  lanes value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], moved[(NX + NY) * NC + 1], constants[NK + 1];
+} group;
 
-/* out = a s + [0, b]: the chain rule of one map; a (rows x NX), b (rows x NA), s (NX x NC), column major. */
-static inline void chain(int rows, const double *restrict a, const double *restrict b, const double *restrict s,
-                         double *restrict out) {
-  for (int c = 0; c < NC; ++c)
-    for (int i = 0; i < rows; ++i) {
-      double sum = c >= NX ? b[(c - NX) * rows + i] : 0.0;
-      for (int j = 0; j < NX; ++j) sum += a[j * rows + i] * s[c * NX + j];
-      out[c * rows + i] = sum;
-    }
-}
-
-/* Solve for the unknown torques of a map from where they were last; work->arg holds the arguments. */
-static void solve(const map *m, double *torques, work_space *work) {
-  work->arg[5] = torques;
-  work->arg[6] = work->res[0] = work->constants;
-  m->constants(work->arg, work->res, work->iw, work->w, 0);
-  work->res[0] = work->value;
-  for (int k = 0; k < NEWTON_LIMIT; ++k) {
-    double change = 0.0, size = 0.0;
-    m->newton(work->arg, work->res, work->iw, work->w, 0);
+/* Solve for the unknown torques of a map in some lanes from where they were last; now->arg holds the arguments. */
+static void solve(const map *m, mask searching, lanes *torques, group *now) {
+  now->arg[5] = torques;
+  now->arg[6] = now->res[0] = now->constants;
+  m->constants(now->arg, now->res, now->live);
+  now->res[0] = now->value;
+  for (int k = 0; k < NEWTON_LIMIT && any(searching); ++k) {
+    lanes change = splat(0.0), size = splat(0.0);
+    m->newton(now->arg, now->res, now->live);
     for (int i = 0; i < m->unknowns; ++i) {
-      change = fmax(change, fabs(work->value[i] - torques[i]));
-      size = fmax(size, fabs(work->value[i]));
-      torques[i] = work->value[i];
+      change = lanes_fmax(change, lanes_fabs(now->value[i] - torques[i]));
+      size = lanes_fmax(size, lanes_fabs(now->value[i]));
+      torques[i] = blend(searching, now->value[i], torques[i]);
     }
-    if (!(change > NEWTON_TOLERANCE * size)) break;
+    searching &= (mask)(change > NEWTON_TOLERANCE * size);
   }
 }
 
-/* Put the value of a map into work->value and, with `derivatives`, its Jacobians into work->a and work->b. */
-static void evaluate(const map *m, double *torques, int derivatives, work_space *work) {
-  if (m->unknowns) solve(m, torques, work);
-  work->res[0] = work->value;
-  work->res[1] = work->a;
-  work->res[2] = work->b;
-  (derivatives ? m->derivative : m->value)(work->arg, work->res, work->iw, work->w, 0);
+/* Put the value of a map, meant for some lanes, into now->value and, with `derivatives`, its Jacobians into now->a and
+   now->b. */
+static void evaluate(const map *m, mask some, lanes *torques, int derivatives, group *now) {
+  if (m->unknowns) solve(m, some, torques, now);
+  now->res[0] = now->value;
+  now->res[1] = now->a;
+  now->res[2] = now->b;
+  (derivatives ? m->derivative : m->value)(now->arg, now->res, now->live);
 }
 
-/* Advance state x (NX) and sensitivities s (NX x NC, or NULL) by a map; work->arg holds the arguments. */
-static void advance(const map *m, double *x, double *s, work_space *work) {
-  evaluate(m, work->step_torques, s != 0, work);
-  memcpy(x, work->value, sizeof(double) * NX);
-  if (s) {
-    chain(NX, work->a, work->b, s, work->moved);
-    memcpy(s, work->moved, sizeof(double) * NX * NC);
+static void replace(int count, const lanes *from, lanes *into, mask where, int everywhere) {
+  if (everywhere) memcpy(into, from, sizeof(lanes) * (size_t)count);
+  for (int i = 0; i < count && !everywhere; ++i) into[i] = blend(where, from[i], into[i]);
+}
+
+/* Advance states and sensitivities of some lanes by a map; now->arg holds the arguments. */
+static void advance(const map *m, mask some, group *now) {
+  int all = !any(~some);
+  evaluate(m, some, now->step_torques, now->derivatives, now);
+  if (now->derivatives) {
+    m->chain(now->a, now->b, now->s, now->moved);
+    replace(NX * NC, now->moved, now->s, some, all);
   }
+  replace(NX, now->value, now->x, some, all);
 }
 
-static void step(const course *at, const double *u, double h, double *x, double *s, work_space *work) {
-  const double **arg = work->arg;
-  arg[0] = x, arg[1] = u, arg[2] = at->p, arg[3] = &h, arg[4] = at->width;
-  advance(&STEP, x, s, work);
-}
+/* A row of a table (n x columns) of each segment, at its node k or its last. */
+static inline long row_of(const segment *at, long k) { return k < at->n ? k : at->n - 1; }
 
-static void tick(const course *at, long k, double kind, double *x, double *s, work_space *work) {
+/* Tick the lanes whose node k has this bit; the closing node only where the segment closes the recording. */
+static void tick(long k, long bit, group *now) {
 #ifdef TICK
-  const double **arg = work->arg;
-  arg[0] = x, arg[1] = at->un + k * NU, arg[2] = at->p, arg[3] = &kind;
-  advance(&TICK, x, s, work);
+  lanes kind = splat((double)bit);
+  mask some = {0};
+  for (int i = 0; i < LANES; ++i) {
+    const segment *at = now->at[i];
+    long row = row_of(at, k);
+    some[i] = -(long long)(k + !at->closes < at->n && (at->ticks[row] & bit));
+    for (int j = 0; j < NU; ++j) now->u[j][i] = at->un[row * NU + j];
+  }
+  if (!any(some)) return;
+  now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &kind;
+  advance(&TICK, some, now);
 #endif
 }
 
 /* Cost rho(r) of a residual in noise floors; its weight rho'(r) / r goes to *weight. Sources: losses.py. */
-static inline double cost_of(const yardstick *by, double r, double *weight) {
-  double p = by->parameter, size = fabs(r);
-  switch (by->loss) {
+static inline double cost_of(const double *loss, double r, double *weight) {
+  double p = loss[1], size = fabs(r);
+  switch ((int)loss[0]) {
     case 1:
       size = sqrt(r * r + p * p);
       *weight = 1.0 / size;
@@ -131,69 +128,130 @@ static inline double cost_of(const yardstick *by, double r, double *weight) {
   }
 }
 
-/* Add the comparison of outputs y at node k; with `derivatives` their sensitivities are in work->moved (NY x NC,
-   column major). */
-static void compare(const yardstick *by, long k, const double *y, int derivatives, score *sum, work_space *work) {
-  double v[NC + 1];
-  for (int i = 0; i < NY; ++i) {
-    double sample = by->measured[k * NY + i], weight;
+/* Compare output i at node k; with derivatives its sensitivities are in now->moved (NY x NC, column major). */
+static void compare(long k, int i, mask seen, group *now) {
+  lanes weight = splat(0.0), error = splat(0.0), scale = splat(0.0), v[NC + 1];
+  int compared = 0;
+  for (int lane = 0; lane < now->live; ++lane) {
+    const segment *at = now->at[lane];
+    double sample = seen[lane] ? at->measured[k * NY + i] : NAN, how_much;
     if (!isfinite(sample)) continue;
-    double error = (y[i] - sample) / by->noise[i];
-    sum->cost += cost_of(by, error, &weight);
-    if (!derivatives) continue;
-    for (int c = 0; c < NC; ++c) v[c] = work->moved[c * NY + i] / by->noise[i];
-    for (int c = 0; c < NC; ++c) {
-      double pull = weight * v[c], *row = sum->square + c * NC;
-      sum->gradient[c] += pull * error;
-      for (int d = 0; d <= c; ++d) row[d] += pull * v[d];
+    compared = 1;
+    scale[lane] = 1.0 / at->noise[i];
+    error[lane] = (now->value[i][lane] - sample) / at->noise[i];
+    now->cost[lane] += cost_of(at->loss, error[lane], &how_much);
+    weight[lane] = how_much;
+  }
+  if (!compared || !now->derivatives) return;
+  for (int c = 0; c < NC; ++c) v[c] = pick((mask)(scale != 0.0), now->moved[c * NY + i] * scale);
+  for (int c = 0; c < NC; ++c) {
+    lanes pull = weight * v[c], *row = now->square + c * NC;
+    now->gradient[c] += pull * error;
+    for (int d = 0; d <= c; ++d) row[d] += pull * v[d];
+  }
+}
+
+/* Write or compare what is seen at node k. */
+static void observe(long k, group *now) {
+  const segment *first = now->at[0];
+  int derivatives = now->derivatives && (first->dy || first->measured);
+  mask seen = {0};
+  if (!first->states && !first->y) return;
+  for (int i = 0; i < LANES; ++i) {
+    const segment *at = now->at[i];
+    long row = row_of(at, k);
+    seen[i] = -(long long)(i < now->live && k + !at->closes < at->n);
+    for (int j = 0; j < NU; ++j) now->u[j][i] = at->un[row * NU + j];
+  }
+  for (int i = 0; i < now->live; ++i)
+    if (seen[i] && now->at[i]->states)
+      for (int j = 0; j < NX; ++j) now->at[i]->states[k * NX + j] = now->x[j][i];
+  if (!first->y || NY == 0) return;
+  now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &now->h, now->arg[4] = now->width;
+  evaluate(now->output, seen, now->output_torques, derivatives, now);
+  if (derivatives) now->output->chain(now->a, now->b, now->s, now->moved);
+  for (int i = 0; i < now->live; ++i) {
+    const segment *at = now->at[i];
+    if (!seen[i]) continue;
+    for (int j = 0; j < NY; ++j) at->y[k * NY + j] = now->value[j][i];
+    if (derivatives && at->dy)
+      for (int j = 0; j < NY; ++j)
+        for (int c = 0; c < NC; ++c) at->dy[(k * NY + j) * NC + c] = now->moved[c * NY + j][i];
+  }
+  if (first->measured)
+    for (int i = 0; i < NY; ++i) compare(k, i, seen, now);
+}
+
+/* Advance all lanes through interval k, each by its own steps. */
+static void cross(long k, group *now) {
+  long most = 0;
+  for (int i = 0; i < now->live; ++i)
+    if (k + 1 < now->at[i]->n && now->at[i]->substeps[k] > most) most = now->at[i]->substeps[k];
+  for (long sub = 0; sub < most; ++sub) {
+    mask some = {0};
+    for (int i = 0; i < LANES; ++i) {
+      const segment *at = now->at[i];
+      long row = row_of(at, k);
+      double share = (sub + 0.5) / (double)at->substeps[row];
+      some[i] = -(long long)(k + 1 < at->n && sub < at->substeps[row]);
+      for (int j = 0; j < NU; ++j)
+        now->u[j][i] = at->u0[row * NU + j] + share * (at->u1[row * NU + j] - at->u0[row * NU + j]);
+    }
+    now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &now->h, now->arg[4] = now->width;
+    advance(&STEP, some, now);
+  }
+}
+
+static void begin(group *now) {
+  for (int i = 0; i < LANES; ++i) {
+    const segment *at = now->at[i];
+    for (int j = 0; j < NX; ++j) now->x[j][i] = at->x0[j];
+    for (int j = 0; j < NP; ++j) now->p[j][i] = at->p[j];
+    for (int j = 0; j < NW; ++j) now->width[j][i] = at->width[j];
+    now->h[i] = at->dt[0] / (double)at->substeps[0];
+  }
+  memset(now->step_torques, 0, sizeof now->step_torques);
+  memset(now->output_torques, 0, sizeof now->output_torques);
+  now->cost = splat(0.0);
+  if (!now->derivatives) return;
+  memset(now->s, 0, sizeof now->s);
+  for (int i = 0; i < NX; ++i) now->s[i * NX + i] = splat(1.0);
+  memset(now->gradient, 0, sizeof now->gradient);
+  memset(now->square, 0, sizeof now->square);
+}
+
+static void finish(const group *now) {
+  for (int i = 0; i < now->live; ++i) {
+    const segment *at = now->at[i];
+    for (int j = 0; j < NX; ++j) at->end[j] = now->x[j][i];
+    if (now->derivatives)
+      for (int j = 0; j < NX * NC; ++j) at->dend[j] = now->s[j][i];
+    if (!at->measured) continue;
+    *at->cost = now->cost[i];
+    for (int c = 0; c < NC && now->derivatives; ++c) {
+      at->gradient[c] = now->gradient[c][i];
+      for (int d = 0; d <= c; ++d) at->square[c * NC + d] = at->square[d * NC + c] = now->square[c * NC + d][i];
     }
   }
 }
 
-/* Write outputs y (NY) and, where s is given, their sensitivities to work->moved (NY x NC, column major) and, where dy
-   is given, to dy (NY x NC, row major) at node k. */
-static void observe(const course *at, long k, double h, const double *x, const double *s, double *y, double *dy,
-                    work_space *work) {
-  const double **arg = work->arg;
-  int derivatives = s != 0;
-  arg[0] = x, arg[1] = at->un + k * NU, arg[2] = at->p, arg[3] = &h, arg[4] = at->width;
-  evaluate(at->output, work->output_torques, derivatives, work);
-  memcpy(y, work->value, sizeof(double) * NY);
-  if (!derivatives) return;
-  chain(NY, work->a, work->b, s, work->moved);
-  if (!dy) return;
-  for (int i = 0; i < NY; ++i)
-    for (int c = 0; c < NC; ++c) dy[i * NC + c] = work->moved[c * NY + i];
-}
-
-/* One segment: state x and sensitivities s (or NULL) advance in place; states (n x NX), y (n x NY) and dy
-   (n x NY x NC), each of which may be NULL, are written at the nodes; where there is a yardstick, outputs are compared
-   with it. The closing node is the next segment's first: only the last segment, which `closes`, ticks and writes it. */
-static void segment(const course *at, double *x, double *s, double *states, double *y, double *dy,
-                    const yardstick *by, score *sum, int closes) {
-  work_space work;
-  double u[NU + 1], h = at->dt[0] / (double)at->substeps[0];
-  memset(work.step_torques, 0, sizeof work.step_torques);
-  memset(work.output_torques, 0, sizeof work.output_torques);
-  for (long k = 0; k < at->n; ++k) {
-    int last = k == at->n - 1;
-    if (last && !closes) return;
-    if (at->ticks[k] & 2) tick(at, k, 2.0, x, s, &work);
-    if (at->ticks[k] & 1) tick(at, k, 1.0, x, s, &work);
-    if (at->dt[k] > 0.0) h = at->dt[k] / (double)at->substeps[k];
-    if (states) memcpy(states + k * NX, x, sizeof(double) * NX);
-    if (y && NY > 0) {
-      observe(at, k, h, x, dy || by ? s : 0, y + k * NY, dy ? dy + k * NY * NC : 0, &work);
-      if (by) compare(by, k, y + k * NY, s != 0, sum, &work);
-    }
-    if (last) return;
-    for (long sub = 0; sub < at->substeps[k]; ++sub) {
-      double share = (sub + 0.5) / (double)at->substeps[k];
-      for (int i = 0; i < NU; ++i)
-        u[i] = at->u0[k * NU + i] + share * (at->u1[k * NU + i] - at->u0[k * NU + i]);
-      step(at, u, h, x, s, &work);
-    }
+static void simulate(group *now) {
+  long nodes = 0;
+  begin(now);
+  for (int i = 0; i < now->live; ++i)
+    if (now->at[i]->n > nodes) nodes = now->at[i]->n;
+  for (long k = 0; k < nodes; ++k) {
+    for (int i = 0; i < now->live; ++i)
+      if (now->at[i]->course && k < now->at[i]->n)
+        for (int j = 0; j < NX; ++j) now->at[i]->course[k * NX + j] = now->x[j][i];
+    tick(k, 2, now);
+    tick(k, 1, now);
+    for (int i = 0; i < LANES; ++i)
+      if (k < now->at[i]->n && now->at[i]->dt[k] > 0.0) now->h[i] = now->at[i]->dt[k] / (double)now->at[i]->substeps[k];
+    observe(k, now);
+    cross(k, now);
   }
+  finish(now);
 }
 
 static const map *output_map(const double *p) {
@@ -205,38 +263,23 @@ static const map *output_map(const double *p) {
   return &OUTPUT;
 }
 
-/* Segments one after the other: segment j covers nodes first[j] .. first[j + 1]; the last one `closes` the
-   recording or not. Grid arrays, measured and y, dy, states begin at node 0 of the recording.
-   x0 (segments x NX) -> end (segments x NX) and, with `derivatives`, dend (segments x NX x NC, column major).
-   Where there is `measured`: cost (segments) and, with `derivatives`, gradient (segments x NC) and square (segments x
-   NC x NC), zeros before. */
-SWEEP_EXPORT void friction_ocp_sweep(long segments, int closes, const long *first, const double *dt,
-                                     const long *substeps, const long *ticks, const double *u0, const double *u1,
-                                     const double *un, const double *p, const double *width, const double *x0,
-                                     const double *measured, const double *noise, int loss, double parameter,
-                                     int derivatives, double *states, double *y, double *dy, double *end,
-                                     double *dend, double *cost, double *gradient, double *square) {
-  const map *output = output_map(p);
-  for (long j = 0; j < segments; ++j) {
-    long begin = first[j], count = first[j + 1] - begin + 1;
-    course at = {count,           dt + begin,      substeps + begin, ticks + begin, u0 + begin * NU,
-                 u1 + begin * NU, un + begin * NU, p,                width,         output};
-    yardstick by = {measured ? measured + begin * NY : 0, noise, loss, parameter};
-    score sum = {0.0, derivatives && measured ? gradient + j * NC : 0, derivatives && measured ? square + j * SQUARE : 0};
-    double x[NX + 1], s[NX * NC + 1];
-    memcpy(x, x0 + j * NX, sizeof(double) * NX);
-    if (derivatives) {
-      memset(s, 0, sizeof s);
-      for (int i = 0; i < NX; ++i) s[i * NX + i] = 1.0;
+#define SWEEP_EXPORT __attribute__((visibility("default")))
+
+SWEEP_EXPORT int friction_ocp_lanes(void) { return LANES; }
+
+/* Simulate segments, those that stand beside each other side by side: the more alike their lengths, the better. All of
+   them have the same NULLs. */
+SWEEP_EXPORT void friction_ocp_sweep(long count, const segment *segments, int derivatives) {
+  for (long done = 0; done < count;) {
+    group now;
+    now.derivatives = derivatives;
+    now.output = output_map(segments[done].p);
+    for (now.live = 0; now.live < LANES && done + now.live < count; ++now.live) {
+      if (output_map(segments[done + now.live].p) != now.output) break;
+      now.at[now.live] = segments + done + now.live;
     }
-    segment(&at, x, derivatives ? s : 0, states ? states + begin * NX : 0, y ? y + begin * NY : 0,
-            (derivatives && dy) ? dy + begin * NY * NC : 0, measured ? &by : 0, &sum, closes && j == segments - 1);
-    memcpy(end + j * NX, x, sizeof(double) * NX);
-    if (derivatives) memcpy(dend + j * NX * NC, s, sizeof(double) * NX * NC);
-    if (!measured) continue;
-    cost[j] = sum.cost;
-    if (derivatives)
-      for (int c = 0; c < NC; ++c)
-        for (int d = 0; d < c; ++d) sum.square[d * NC + c] = sum.square[c * NC + d];
+    for (int i = now.live; i < LANES; ++i) now.at[i] = now.at[0];
+    done += now.live;
+    simulate(&now);
   }
 }

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from itertools import pairwise
 
 import casadi as ca
-import numpy as np
 
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.simulation.compiled import compile_sweep
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
 from friction_ocp.simulation.interpreted import InterpretedKernel
-from friction_ocp.simulation.kernel import AbstractKernel, SweepRequest, SweepResult, empty_result
+from friction_ocp.simulation.kernel import AbstractKernel, Piece, SweepRequest, SweepResult, empty_result
 
 __all__ = ["Sweep", "SweepRequest", "SweepResult"]
-
-STEPS_WORTH_A_THREAD = 1500
-"""Integrator steps (about 0.3 ms) below which handing work to another thread costs more than it saves."""
 
 
 class Sweep:
@@ -54,18 +47,8 @@ class Sweep:
     def run_many(self, requests: Sequence[SweepRequest]) -> list[SweepResult]:
         """Simulate several recordings, side by side where there is more than one processor."""
         results = [self._empty(request) for request in requests]
-        threads = worker_count() if self.kernel.parallel else 1
-        pieces = _pieces(requests, threads)
-
-        def work(piece: tuple[int, int, int]) -> None:
-            index, begin, stop = piece
-            self.kernel.run(requests[index], begin, stop, results[index])
-
-        if threads > 1 and len(pieces) > 1:
-            list(_pool(threads).map(work, pieces))
-        else:
-            for piece in pieces:
-                work(piece)
+        pieces = [Piece(item, 0, len(item.first) - 1, into) for item, into in zip(requests, results, strict=True)]
+        self.kernel.run(pieces, worker_count())
         return results
 
     def _empty(self, request: SweepRequest) -> SweepResult:
@@ -79,31 +62,6 @@ def worker_count() -> int:
     if stated.isdigit():
         return max(1, int(stated))
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix="sweep")
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def _pieces(requests: Sequence[SweepRequest], threads: int) -> list[tuple[int, int, int]]:
-    """Cut requests into (request, first segment, last segment + 1) of about equal work, the largest first."""
-    steps = [np.add.reduceat(request.grid.substeps, request.first[:-1]) for request in requests]
-    total = sum(int(count.sum()) for count in steps)
-    share = max(total / threads, STEPS_WORTH_A_THREAD)
-    pieces: list[tuple[int, int, int, int]] = []
-    for index, count in enumerate(steps):
-        parts = max(1, min(len(count), round(int(count.sum()) / share)))
-        goals: FloatArray = count.sum() * np.arange(1, parts) / parts
-        cuts = [0, *(int(edge) + 1 for edge in np.searchsorted(np.cumsum(count), goals)), len(count)]
-        pieces += [(int(count[a:b].sum()), index, a, b) for a, b in pairwise(cuts) if b > a]
-    if total < 2 * STEPS_WORTH_A_THREAD:
-        return [(index, 0, len(request.first) - 1) for index, request in enumerate(requests)]
-    return [(index, a, b) for _, index, a, b in sorted(pieces, reverse=True)]
 
 
 def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:

@@ -11,7 +11,7 @@ from sweep_cases import DRIVES, Case
 
 from friction_ocp.simulation.compiled import CompiledKernel, compiler, load_library
 from friction_ocp.simulation.interpreted import InterpretedKernel
-from friction_ocp.simulation.kernel import SweepResult, empty_result
+from friction_ocp.simulation.kernel import Piece, SweepResult, empty_result
 from friction_ocp.simulation.sweep import Sweep
 
 ROUNDING = 1e-10
@@ -43,7 +43,7 @@ def test_compiled_equals_interpreted(name: str, width: float) -> None:
     for derivatives in (False, True):
         request = case.request(np.random.default_rng(4), width, derivatives)
         into = empty_result(request, len(case.model.state_names), len(case.model.output_names), len(case.active))
-        interpreted.run(request, 0, 3, into)
+        interpreted.run([Piece(request, 0, 3, into)])
         assert_same(sweep.run_many([request])[0], into)
 
 

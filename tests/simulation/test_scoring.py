@@ -9,7 +9,7 @@ import pytest
 from sweep_cases import DRIVES, Case
 
 from friction_ocp.simulation.interpreted import InterpretedKernel
-from friction_ocp.simulation.kernel import SweepRequest, SweepResult, Yardstick, empty_result
+from friction_ocp.simulation.kernel import Piece, SweepRequest, SweepResult, Yardstick, empty_result
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 from friction_ocp.simulation.sweep import Sweep
 
@@ -51,7 +51,7 @@ def test_score_is_that_of_the_outputs(name: str, loss: AbstractLoss) -> None:
     assert scored.yardstick is not None
     wanted = expected(request, scored.yardstick, sweep.run_many([request])[0])
     interpreted = empty_result(scored, len(case.model.state_names), len(case.model.output_names), len(case.active))
-    InterpretedKernel(case.model, case.active).run(scored, 0, 3, interpreted)
+    InterpretedKernel(case.model, case.active).run([Piece(scored, 0, 3, interpreted)])
     for result in (sweep.run_many([scored])[0], interpreted):
         score = result.score
         assert score is not None and result.dy is None
