@@ -191,7 +191,7 @@ def generated_source(drive: SteppedDrive, active: Sequence[int], values_only: bo
     code = [lane_code(function) for function in (*functions, *slopes.values())]
     code += [chain_code(name, slope) for name, slope in slopes.items()]
     table = _table(maps, delay_indices(drive), values_only)
-    return "\n".join((_c_code("lanes.h"), defines, *code, MAP, table, _c_code("sweep.c")))
+    return "\n".join((_c_code("lanes.h"), _c_code("lane_math.h"), defines, *code, MAP, table, _c_code("sweep.c")))
 
 
 def _c_code(name: str) -> str:

@@ -17,11 +17,14 @@ ARITHMETIC = {
     ca.OP_TWICE: "{0} + {0}",
     ca.OP_INV: "1.0 / {0}",
 }
-AT_ONCE = {ca.OP_FABS: "fabs", ca.OP_FMIN: "fmin", ca.OP_FMAX: "fmax", ca.OP_SIGN: "sign", ca.OP_SQRT: "sqrt"}
+AT_ONCE = {
+    getattr(ca, f"OP_{name.upper()}"): name
+    for name in ("fabs", "fmin", "fmax", "sign", "sqrt", "exp", "expm1", "log", "tanh")
+}
 ONE_BY_ONE = {
     getattr(ca, f"OP_{name.upper()}"): name
     for name in (
-        *("exp", "expm1", "log", "log1p", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+        *("log1p", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh"),
         *("asinh", "acosh", "atanh", "erf", "floor", "ceil", "pow", "fmod", "remainder", "atan2", "hypot", "copysign"),
     )
 } | {ca.OP_CONSTPOW: "pow"}
