@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -27,20 +27,26 @@ SMOOTHING_STEPS = 4
 FINE, MOST_FINE = 4, 3000
 """Samples in the segments that show what torque is missing as finely as recordings tell; most such segments in one."""
 
+MISSED = 0.1
+"""Torque that may be missing over that which moves a shaft. Ten times more or less shows the same waves."""
+
 
 def clues_of(fitted: FittedModel) -> Clues:
     """Return what the fitted model says about motions and torques."""
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
-    free = fitted.footing.segment_s is None
-    coarse = _smoothers(fitted, fitted.model.problem.estimation.segment) if free else fitted.linear.recordings
-    longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
-    pairs = zip(coarse, _smoothers(fitted, max(FINE, longest // MOST_FINE)), strict=True)
-    tracks = tuple(_track(fitted, index, watch, names, *pair) for index, pair in enumerate(pairs))
+    tables = [_table(fitted, index, watch, names) for index in range(len(fitted.linear.recordings))]
     first = fitted.model.train[0].name
     numbers = fitted.model.space.numbers(fitted.theta, first)
     by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
-    return Clues(tracks, by_path, _typical_torques(fitted, tracks, by_path), _steady_speeds(fitted, by_path))
+    typical = _typical_torques(fitted, tables, by_path)
+    free = fitted.footing.segment_s is None
+    segment = fitted.model.problem.estimation.segment
+    coarse = _smoothers(fitted, segment, typical) if free else fitted.linear.recordings
+    longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
+    finely = _smoothers(fitted, max(FINE, longest // MOST_FINE), typical)
+    tracks = tuple(_track(fitted, *parts) for parts in zip(tables, coarse, finely, strict=True))
+    return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path))
 
 
 def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[str, FloatArray]:
@@ -80,19 +86,18 @@ def states_along(fitted: FittedModel, index: int) -> FloatArray:
     return result.states
 
 
-def _track(
-    fitted: FittedModel,
-    index: int,
-    watch: ca.Function,
-    names: list[str],
-    coarse: LinearRecording,
-    fine: LinearRecording,
-) -> Track:
+def _table(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]) -> dict[str, FloatArray]:
+    """Return (n,) motions of all shafts and torques of all motors along a recording, by name."""
     item = fitted.linear.program.experiments[index]
     numbers = fitted.model.space.numbers(fitted.theta, item.name)
     states = states_along(fitted, index)
     seen = np.asarray(watch.map(item.grid.time.size)(states.T, item.grid.at_node.T, numbers))
-    table = {name: seen[k] for k, name in enumerate(names)}
+    return {name: seen[k] for k, name in enumerate(names)}
+
+
+def _track(
+    fitted: FittedModel, table: Mapping[str, FloatArray], coarse: LinearRecording, fine: LinearRecording
+) -> Track:
     mech = fitted.model.drive.mechanism
 
     def of(kind: str) -> dict[str, FloatArray]:
@@ -100,7 +105,7 @@ def _track(
 
     torque = {motor.name: table[f"{motor.name}.torque"] for motor in mech.drive.motors}
     missing, finely = _missing(fitted, coarse), _missing(fitted, fine)
-    return Track(item.grid.time, of("theta"), of("omega"), torque, missing, finely)
+    return Track(coarse.item.grid.time, of("theta"), of("omega"), torque, missing, finely)
 
 
 def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
@@ -123,11 +128,20 @@ def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
     return Missing(middle, missing)
 
 
-def _smoothers(fitted: FittedModel, samples: int) -> tuple[LinearRecording, ...]:
-    """Return recordings cut into segments between which the states may jump, to see what torque would make them."""
-    options = replace(fitted.model.problem.estimation, segment=samples)
-    model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options))
+def _smoothers(fitted: FittedModel, samples: int, typical: Mapping[str, float]) -> tuple[LinearRecording, ...]:
+    """Return recordings cut into segments between which torques may pull, to see which would make the recordings.
+
+    The torques are taken to be noise of the size that may be missing, a new one in every segment. Of noise in the
+    measurement then only as much is left as such torques could make of it: what the speed is off by from one segment
+    to the next, an encoder hardly sees, and jumps that bind nothing would be all noise. What the sum of these torques
+    and a wave have in common is what tells the wave best from noise (Wiener's filter is the matched filter, for a
+    torque that is as large at all frequencies).
+    """
     items = fitted.linear.program.experiments
+    span = samples * float(np.median(np.diff(items[0].grid.time)))
+    density = {shaft: MISSED * torque * float(np.sqrt(span)) for shaft, torque in typical.items()}
+    options = replace(fitted.model.problem.estimation, segment=samples, process_noise=density, estimated_noise=())
+    model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options), noise_levels=())
     program = relaxed(model, items, 0.0, Squares())
     start = Point(fitted.theta, program.suggested_nodes(fitted.theta))
     point = solve_nodes(program, start, SMOOTHING_STEPS)
@@ -139,7 +153,9 @@ def _per_unit(term: StaticTerm, motor: Motor, numbers: Mapping[str, float]) -> f
     return numbers.get(f"{motor.name}.torque_constant", 1.0) if term.effort == "current" else 1.0
 
 
-def _typical_torques(fitted: FittedModel, tracks: tuple[Track, ...], numbers: dict[str, float]) -> dict[str, float]:
+def _typical_torques(
+    fitted: FittedModel, tables: Sequence[Mapping[str, FloatArray]], numbers: dict[str, float]
+) -> dict[str, float]:
     """Return the rms of motor torques, carried through the ratios to every shaft; 1 where there is no motor.
 
     A motor without current, whose shaft is moved by an input, does what static points say.
@@ -147,7 +163,7 @@ def _typical_torques(fitted: FittedModel, tracks: tuple[Track, ...], numbers: di
     drive = fitted.model.problem.drive
     found: dict[str, float] = {}
     for motor in drive.motors:
-        values = np.concatenate([track.torque[motor.name] for track in tracks])
+        values = np.concatenate([table[f"{motor.name}.torque"] for table in tables])
         if not np.any(values) and fitted.model.static:
             values = np.concatenate([term.measured * _per_unit(term, motor, numbers) for term in fitted.model.static])
         found[motor.shaft] = max(float(np.sqrt(np.mean(values**2))), 1e-12)

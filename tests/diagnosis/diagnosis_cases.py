@@ -67,7 +67,7 @@ def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str]
         },
         "channels": {
             "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": CURRENT_NOISE},
-            "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
+            "position": {"measures": "motor.theta", "resolution": plant.sensors[0].resolution},
         },
         "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
         "diagnosis": {"effects": list(effects)},

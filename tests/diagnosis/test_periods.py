@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+from diagnosis_cases import TORQUE_CONSTANT, axis, write_case
+from plant import PlantRipple
 
+from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.statistics.execution import Execution
 
 SAMPLES, INTERVAL, SEGMENT = 6000, 1e-3, 4
 SPEED, TEETH = 60.0, 24
@@ -31,3 +40,15 @@ def test_a_wave_is_found_beside_a_larger_drift(drift: float) -> None:
     found = clues(0.1, drift).periods("motor", "theta")
     travel = 2.0 * SPEED / np.pi
     assert min(abs(1.0 / period - TEETH / (2.0 * np.pi)) for period in found[:2]) < 1.0 / travel
+
+
+def test_a_wave_is_found_through_a_coarse_encoder(tmp_path: Path) -> None:
+    """Steps of an encoder that make more of the speed than the wave does hide it from no one who knows of inertia."""
+    period, plain = 1.1, axis()
+    sensor = replace(plain.sensors[0], resolution=2.0 * np.pi / 2**7)
+    motor = replace(plain.motors[0], cogging=PlantRipple(period, (0.03 * TORQUE_CONSTANT,), (0.0,)))
+    plant = replace(plain, motors=(motor,), sensors=(sensor, plain.sensors[1]))
+    bench = open_bench(load_problem(write_case(tmp_path, plant)), Execution(InProcess()))
+    travel = float(np.ptp(bench.clues.angles("motor")))
+    found = bench.clues.periods("motor", "theta")
+    assert min(abs(1.0 / item - 1.0 / period) for item in found[:2]) < 1.0 / travel
