@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
 from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.friction.composite import Bristle, with_bristle
@@ -32,7 +33,8 @@ class PreslidingEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         shaft, stem = drive.shaft(place), f"{place}.friction.bristle"
-        breakaway = _breakaway(clues, place)
+        lifted = _lifted(drive, clues, place)
+        breakaway = _breakaway({**clues.numbers, **lifted}, place) or 0.1 * clues.typical_torque[place]
         travel = max(float(np.ptp(track.theta[place])) for track in clues.tracks)
         stiffnesses = [breakaway / max(share * travel, 1e-300) for share in (1e-4, 1e-3, 1e-2, 5e-2)]
         aperiodic = [2.0 * float(np.sqrt(item * clues.numbers[f"{place}.inertia"])) for item in stiffnesses]
@@ -43,17 +45,28 @@ class PreslidingEffect(AbstractEffect):
         law = with_bristle(shaft.friction.law, bristle)
         added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
         trials = tuple(
-            Trial(({f"{stem}.sigma0": stiffness},), {f"{stem}.sigma1": damping}, inverse=True)
+            Trial(({f"{stem}.sigma0": stiffness},), {f"{stem}.sigma1": damping, **lifted}, inverse=True)
             for stiffness, most in zip(stiffnesses, aperiodic, strict=True)
             for damping in (0.0, DAMPED * most)
         )
         return Augmentation(added, {f"{stem}.sigma0": np.inf, f"{stem}.sigma1": 0.0}, trials)
 
 
-def _breakaway(clues: Clues, place: str) -> float:
+def _breakaway(numbers: Mapping[str, float], place: str) -> float:
+    """Return the Coulomb torque of a shaft; 0 where its law has none."""
     stem = f"{place}.friction.tau_c"
-    known = [value for path, value in clues.numbers.items() if path.startswith(stem) and value > 0]
-    return known[0] if known else 0.1 * clues.typical_torque[place]
+    return next((value for path, value in numbers.items() if path.startswith(stem) and value > 0), 0.0)
+
+
+def _lifted(drive: Drive, clues: Clues, place: str) -> dict[str, float]:
+    """Return the guesses of dry friction that are above what was fitted, by path.
+
+    Friction that gives way like a spring looks like none to a model in which it jumps with the sign of the speed: of
+    too little of it a bristle has nothing to carry, whatever its stiffness.
+    """
+    leaves = {leaf.path: leaf.value for leaf in drive_leaves(drive) if leaf.path.startswith(f"{place}.friction.tau_")}
+    guesses = {path: value.guess for path, value in leaves.items() if isinstance(value, Free)}
+    return {path: guess for path, guess in guesses.items() if guess > clues.numbers.get(path, guess)}
 
 
 class LoadDependenceEffect(AbstractEffect):
