@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.linear import LinearProgram, LinearRecording
+from friction_ocp.diagnosis.linear import LinearProgram
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import stepped
 from friction_ocp.estimation.model import Model, seen_by
@@ -16,6 +16,18 @@ from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.kernel import Piece, SweepRequest, empty_result
 from friction_ocp.simulation.sweep import Sweep
+
+
+@dataclass(frozen=True)
+class Track:
+    """What a candidate does in one recording."""
+
+    y: FloatArray
+    """(n, outputs)."""
+    end: FloatArray
+    """(segments, states) where segments end, in the states of the base model."""
+    nodes: FloatArray
+    """(segments, states) its own states where they begin."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +46,13 @@ class Contrast:
 
     def columns(self, values: list[Mapping[str, float]]) -> FloatArray:
         """Return (rows, k) what each set of added values does, nodes solved for, parameters not yet absorbed."""
+        recordings = self.base.recordings
+        tracks = self.simulate([(index, self.theta(at)) for index in range(len(recordings)) for at in values])
         parts: list[FloatArray] = []
-        for index, item in enumerate(self.base.recordings):
-            changes = [self._change(index, item, self.theta(at)) for at in values]
-            by_y, by_end = (np.stack(column, axis=2) for column in zip(*changes, strict=True))
-            parts.append(item.change(by_y, by_end))
+        for index, item in enumerate(recordings):
+            own = tracks[index * len(values) : (index + 1) * len(values)]
+            by_y, by_end = (np.stack(column, axis=2) for column in zip(*((t.y, t.end) for t in own), strict=True))
+            parts.append(item.change(by_y - item.y[:, :, None], by_end - item.end[:, :, None]))
         parts += [self._static_change(k, values) for k in range(len(self.static))]
         prior = self.base.rows.residual.size - sum(part.shape[0] for part in parts)
         return np.concatenate([*parts, np.zeros((prior, len(values)))])
@@ -55,35 +69,40 @@ class Contrast:
         moved = [term.predict(self.space, self.theta(at)) for at in values]
         return np.column_stack([(one - still) / before.std_error for one in moved])
 
-    def _change(self, index: int, item: LinearRecording, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        y, end, _ = self.simulate(index, item, theta)
-        return y - item.y, end - item.end
+    def simulate(self, wanted: Sequence[tuple[int, FloatArray]]) -> list[Track]:
+        """Return the candidate with some parameters in some recordings, side by side.
 
-    def simulate(
-        self, index: int, item: LinearRecording, theta: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return outputs, segment ends in the states of the base model, and the candidate's states at all nodes."""
-        base_names, names = self.base.program.drive.state_names, self.sweep.drive.state_names
-        shared = [names.index(name) for name in base_names]
-        own = seen_by(self.model, self.sweep.drive, item.item)
-        numbers = self.space.numbers(theta, own.name)
-        width = np.zeros(len(self.sweep.drive.mechanism.topology.roots) + 1)
-        nodes = np.zeros((item.cut.count, len(names)))
+        States that the base model does not have go on from segment to segment.
+        """
+        started = [self._started(index, theta) for index, theta in wanted]
+        names, outputs = self.sweep.drive.state_names, len(self.sweep.drive.output_names)
+        shared = [names.index(name) for name in self.base.program.drive.state_names]
         extra = np.setdiff1d(np.arange(len(names)), shared)
-        if extra.size:
+        runs = [(request, empty_result(request, len(names), outputs, 0)) for request in started]
+        counts = [len(request.x0) for request in started]
+        if not extra.size:
+            self.sweep.run_pieces([Piece(*run, 0, count) for run, count in zip(runs, counts, strict=True)])
+        for j in range(max(counts, default=0) if extra.size else 0):
+            going = [run for run, count in zip(runs, counts, strict=True) if j < count]
+            self.sweep.run_pieces([Piece(*run, j, j + 1) for run in going])
+            for request, result in going:
+                request.x0[j + 1 : j + 2, extra] = result.end[j, extra]
+        return [Track(result.y, result.end[:, shared], request.x0) for request, result in runs]
+
+    def _started(self, index: int, theta: FloatArray) -> SweepRequest:
+        """Return the simulation of a recording from the nodes of the base model."""
+        item, drive = self.base.recordings[index], self.sweep.drive
+        names = drive.state_names
+        shared = [names.index(name) for name in self.base.program.drive.state_names]
+        own = seen_by(self.model, drive, item.item)
+        numbers = self.space.numbers(theta, own.name)
+        width = np.zeros(len(drive.mechanism.topology.roots) + 1)
+        nodes = np.zeros((item.cut.count, len(names)))
+        if len(shared) < len(names):
             at = own.signals(int(item.cut.first[0]))
             nodes[0] = np.asarray(self.sweep.start.call([*at, numbers])[0]).ravel()
         nodes[:, shared] = item.nodes
-        request = SweepRequest(own.grid, item.cut.first, nodes, numbers, width)
-        result = empty_result(request, len(names), len(self.sweep.drive.output_names), 0)
-        if extra.size:
-            for j in range(item.cut.count):
-                self.sweep.kernel.run([Piece(request, j, j + 1, result)])
-                if j + 1 < item.cut.count:
-                    nodes[j + 1, extra] = result.end[j, extra]
-        else:
-            self.sweep.kernel.run([Piece(request, 0, item.cut.count, result)])
-        return result.y, result.end[:, shared], nodes
+        return SweepRequest(own.grid, item.cut.first, nodes, numbers, width)
 
 
 def contrast(model: Model, base: LinearProgram, drive: Drive) -> Contrast:

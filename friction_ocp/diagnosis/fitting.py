@@ -223,7 +223,8 @@ def _point(base: FittedModel, model: Model, built: Contrast, values: Mapping[str
     theta = model.space.clip(np.array([wanted[name] for name in model.space.names]))
     known = dict(zip(model.space.names, theta, strict=True))
     at = np.array([known[name] for name in built.space.names])
-    return Point(theta, tuple(built.simulate(k, item, at)[2] for k, item in enumerate(base.linear.recordings)))
+    tracks = built.simulate([(k, at) for k in range(len(base.linear.recordings))])
+    return Point(theta, tuple(track.nodes for track in tracks))
 
 
 def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:

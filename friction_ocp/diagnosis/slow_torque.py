@@ -106,12 +106,13 @@ def _slow_torque(fitted: FittedModel, probe: Probe) -> SlowTorque:
     built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
     theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0
-    for index, item in enumerate(fitted.linear.recordings):
-        y, end, _ = built.simulate(index, item, theta)
+    recordings = fitted.linear.recordings
+    tracks = built.simulate([(index, theta) for index in range(len(recordings))])
+    for item, track in zip(recordings, tracks, strict=True):
         stretch = (np.arange(item.cut.count) * STRETCHES) // item.cut.count
         marks = (stretch[:, None] == np.arange(STRETCHES)).astype(float)
-        by_end = (end - item.end)[:, :, None] * marks[:, None, :]
-        by_y = (y - item.y)[:, :, None] * marks[item.segment][:, None, :]
+        by_end = (track.end - item.end)[:, :, None] * marks[:, None, :]
+        by_y = (track.y - item.y)[:, :, None] * marks[item.segment][:, None, :]
         own = item.change(by_y, by_end)
         whole = np.zeros((rows.residual.size, STRETCHES))
         whole[begin : begin + own.shape[0]] = own

@@ -32,7 +32,7 @@ FLAGS = (
 )
 """The same numbers on every processor. Reciprocals take the place of repeated divisions; sums stay in the order of the
 model: with `-fassociative-math` the values beside derivatives are no longer those without."""
-QUICK_FLAGS = ("-O1", *FLAGS[1:])
+QUICK_FLAGS = ("-O2", *FLAGS[1:])
 """For code that runs a few times only, such as the values of a candidate: sooner compiled."""
 STEPS_WORTH_A_THREAD = 1500
 """Integrator steps below which handing work to another thread costs more than it saves."""

@@ -77,10 +77,10 @@ class Piece:
     """Segments `begin` .. `stop` - 1 of a request, and the result that they belong to."""
 
     request: SweepRequest
-    begin: int
-    stop: int
     into: SweepResult
     """Its `dend` is a view of memory in the order (segments, columns, states)."""
+    begin: int
+    stop: int
 
     @property
     def steps(self) -> IntArray:

@@ -41,7 +41,7 @@ class Parts:
         first = self.first if self.first[-1] == closing else np.append(self.first, closing)
         smaller = replace(request, first=first, x0=x0)
         found = empty_result(smaller, x0.shape[1], into.y.shape[1], self._columns - x0.shape[1])
-        return Piece(smaller, 0, len(x0), replace(found, y=into.y, states=into.states))
+        return Piece(smaller, replace(found, y=into.y, states=into.states), 0, len(x0))
 
     @property
     def _columns(self) -> int:
