@@ -32,24 +32,27 @@ class Rows:
 
     def absorbed(self, columns: FloatArray) -> FloatArray:
         """Return what is left of columns once the parameters have absorbed what they can."""
-        basis = self.basis
+        basis, _ = self._factors
         return columns - basis @ (basis.T @ columns)
 
     def fitted(self, column: FloatArray) -> FloatArray:
         """Return (parameters,) the change of the parameters that comes closest to a column."""
-        scale = np.maximum(np.linalg.norm(self.jacobian, axis=0), 1e-300)
-        answer = np.asarray(np.linalg.lstsq(self.jacobian / scale, column, rcond=1e-10)[0], dtype=np.float64)
-        return answer / scale
+        basis, back = self._factors
+        return back @ (basis.T @ column)
 
     @cached_property
-    def basis(self) -> FloatArray:
-        """(rows, rank) orthonormal basis of what the parameters can do."""
+    def _factors(self) -> tuple[FloatArray, FloatArray]:
+        """Return (rows, rank) an orthonormal basis of what the parameters can do, and (parameters, rank) how."""
         scale = np.linalg.norm(self.jacobian, axis=0)
         told = scale > 0
+        back = np.zeros((scale.size, 0))
         if not told.any():
-            return np.zeros((self.residual.size, 0))
-        left, sizes, _ = np.linalg.svd(self.jacobian[:, told] / scale[told], full_matrices=False)
-        return left[:, sizes > 1e-10 * sizes[0]]
+            return np.zeros((self.residual.size, 0)), back
+        left, sizes, right = np.linalg.svd(self.jacobian[:, told] / scale[told], full_matrices=False)
+        kept = sizes > 1e-10 * sizes[0]
+        back = np.zeros((scale.size, int(np.sum(kept))))
+        back[told] = right[kept].T / sizes[kept] / scale[told, None]
+        return left[:, kept], back
 
 
 class LinearRecording:
