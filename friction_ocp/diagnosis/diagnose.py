@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Crew, Tell, open_bench
+from friction_ocp.diagnosis.bench import Bench, Crew, Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
@@ -174,13 +174,9 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     rng = np.random.default_rng(problem.estimation.seed)
     rounds, accepted = list[Round](), list[Key]()
     with execution.executor.kept() as executor:
+        run = replace(execution, executor=executor)
         for number in range(1, MOST_ROUNDS + 1):
-            crew = Crew(
-                bench,
-                replace(execution, executor=executor),
-                number,
-                lambda what, share, n=number: tell(f"round {n}: {what}", share),
-            )
+            crew = _crew(bench, run, number, tell)
             done = _round(crew, names, level, rng, required(base, bench.current), accepted)
             rounds.append(done)
             if done.accepted is None:
@@ -192,6 +188,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
                 current, rounds, accepted = exchanged(base, current, rounds, accepted, level, rng)
             bench = bench.at(current)
             if not innovations(current).significant(level):
+                bench, rounds, accepted = _settled(bench, run, tell, rounds, accepted, level, rng)
                 break
     current, checked = _checked(bench.current, level)
     rounds, clues, left = [*rounds, *checked], clues_of(current), innovations(current)
@@ -210,6 +207,35 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         blind=blind_spots(current, left, clues, names),
         seconds=time.perf_counter() - began,
     )
+
+
+def _crew(bench: Bench, run: Execution, number: int, tell: Tell) -> Crew:
+    return Crew(bench, run, number, lambda what, share: tell(f"round {number}: {what}", share))
+
+
+def _settled(
+    bench: Bench,
+    run: Execution,
+    tell: Tell,
+    rounds: list[Round],
+    accepted: list[Key],
+    level: float,
+    rng: np.random.Generator,
+) -> tuple[Bench, list[Round], list[Key]]:
+    """Go over additions that leave nothing but noise: their more general shapes, then the rivals of earlier ones.
+
+    What a shape leaves is too little to tell as power, and yet enough to tell rivals apart that are the same.
+    """
+    for _ in set(accepted):
+        done = _round(_crew(bench, run, len(rounds) + 1, tell), [], level, rng, np.inf, accepted)
+        if done.accepted is None:
+            break
+        bench, rounds, accepted = bench.at(done.accepted.fitted), [*rounds, done], [*accepted, done.accepted.key]
+    if len(set(accepted)) > 1:
+        tell("weighing rivals of earlier additions again", 0.0)
+        current, rounds, accepted = exchanged(bench.base, bench.current, rounds, accepted, level, rng)
+        bench = bench.at(current)
+    return bench, rounds, accepted
 
 
 def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Round]]:

@@ -1,4 +1,5 @@
-"""Earlier additions, each examined again when the next is in: dropped, or exchanged for what competed with it then."""
+"""Earlier additions, each examined again when the next is in: dropped, exchanged for what competed with it then, or
+found to be what the recordings cannot tell from it."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, without_addition
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.select import Choice, Rival, Round, resamples
+from friction_ocp.diagnosis.select import Choice, Rival, Round, choose, is_same, resamples
 from friction_ocp.diagnosis.worth import Key, required
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.simulation.grid import FloatArray
@@ -51,20 +52,29 @@ def exchanged(
 ) -> tuple[FittedModel, list[Round], list[Key]]:
     """Put rivals in the place of earlier additions where, beside the later ones, they explain more for certain.
 
-    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither.
+    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. Where
+    no rival explains more for certain, the rivals are weighed again: beside all that was missing then a small
+    difference looked like a large one.
     """
     done, benchmark = list(rounds), _Benchmark(current)
     for index, item in enumerate(done[:-1]):
         key = item.accepted.key if item.accepted is not None else None
         if key is None or accepted.count(key) != 1:
             continue
+        tried = list[Rival]()
         for rival in _others(item.choice, accepted):
             keys = [rival.key if other == key else other for other in accepted]
             swapped = _fitted(base, current, rival, keys)
-            if swapped.cost < current.cost and benchmark.certain(-benchmark.dearer(swapped), level, rng):
+            if not swapped.holds:
+                continue
+            gains = -benchmark.dearer(swapped)
+            if swapped.cost < current.cost and benchmark.certain(gains, level, rng):
                 current, accepted, benchmark = swapped, keys, _Benchmark(swapped)
                 done[index] = replace(item, accepted=rival, choice=_turned(item.choice, rival))
                 break
+            tried.append(replace(rival, fitted=swapped, gains=gains))
+        else:
+            done[index] = _weighed_again(item, benchmark, tried, level, rng)
     return current, done, accepted
 
 
@@ -74,10 +84,44 @@ def _others(choice: Choice, accepted: Sequence[Key]) -> list[Rival]:
 
 
 def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequence[Key]) -> FittedModel:
-    """Fit the base model with some additions, from where the rival ended and what the later ones are now."""
+    """Fit the base model with some additions, from where the rival ended and what the later ones are now.
+
+    Or from where all but the rival are now, if that is nearer.
+    """
     model = with_drive(base.model, with_additions(base, keys))
-    known = {**current.values, **rival.fitted.values}
-    return completed(polished(model, base.footing, model.space.with_known(known), None))
+    starts = [{**current.values, **rival.fitted.values}, {**rival.fitted.values, **current.values}]
+    ends = [polished(model, base.footing, model.space.with_known(known), None) for known in starts]
+    return completed(min(ends, key=lambda end: end.objective))
+
+
+def _weighed_again(
+    item: Round, benchmark: _Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
+) -> Round:
+    """Return a round with the chances that rivals have in the place of what it accepted, now that others are in.
+
+    What they gain is counted from what was accepted, which is worth what it was.
+    """
+    if item.accepted is None or not tried:
+        return item
+    known = dict(zip((rival.key for rival in item.choice.rivals), item.choice.probabilities, strict=True))
+    worth = np.full(benchmark.blocks.count, float(np.sum(item.accepted.gains)) / benchmark.blocks.count)
+    own = replace(item.accepted, fitted=benchmark.fitted, gains=worth)
+    others = [replace(rival, gains=worth + rival.gains) for rival in tried]
+    again = choose([own, *others], benchmark.blocks, level, rng)
+    keys = {rival.key for rival in again.rivals}
+    shared = sum(known[key] for key in keys)
+    known |= {rival.key: shared * chance for rival, chance in zip(again.rivals, again.probabilities, strict=True)}
+    aliases = [own, *(rival for rival in again.aliases if rival is not own)]
+    aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
+    order = sorted(item.choice.rivals, key=lambda rival: (rival is not item.accepted, -known[rival.key]))
+    choice = replace(
+        item.choice,
+        rivals=tuple(order),
+        probabilities=tuple(known[rival.key] for rival in order),
+        aliases=tuple(aliases),
+        same=(own, *(rival for rival in others if is_same(rival, own))),
+    )
+    return replace(item, choice=choice)
 
 
 @dataclass(frozen=True)
@@ -87,20 +131,21 @@ class _Benchmark:
     fitted: FittedModel
 
     @cached_property
-    def _blocks(self) -> Blocks:
+    def blocks(self) -> Blocks:
+        """Blocks of its residuals."""
         return blocks_of(self.fitted.linear.rows)
 
     @cached_property
     def _costs(self) -> FloatArray:
-        return self._blocks.sums(held_out(self.fitted))
+        return self.blocks.sums(held_out(self.fitted))
 
     def dearer(self, other: FittedModel) -> FloatArray:
         """Return (blocks,) what another model costs more than this one."""
-        return blocks_like(self.fitted, other, self._blocks) - self._costs
+        return blocks_like(self.fitted, other, self.blocks) - self._costs
 
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""
-        return bool(np.quantile(resamples(self._blocks, rng) @ gains, level) > 0)
+        return bool(np.quantile(resamples(self.blocks, rng) @ gains, level) > 0)
 
 
 def _turned(choice: Choice, rival: Rival) -> Choice:

@@ -99,3 +99,28 @@ def test_bristles_are_found_with_their_damping(tmp_path: Path) -> None:
     assert found.accepted == (("presliding", "motor"),) and found.verdict == "explained"
     assert found.final.values["motor.friction.bristle.sigma0"] == pytest.approx(stiffness, rel=0.05)
     assert found.final.values["motor.friction.bristle.sigma1"] == pytest.approx(damping, rel=0.1)
+
+
+def test_rivals_are_weighed_again_beside_what_came_later(tmp_path: Path) -> None:
+    """Dry friction that differs by direction remains what a constant torque may be; gravity goes."""
+    plant = axis(tau_c=(1.1 * COULOMB, 0.9 * COULOMB))
+    cogging = PlantRipple(3.1, (0.2 * TORQUE_CONSTANT,), (0.0,))
+    plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
+    names = ("constant_torque", "asymmetry", "unbalance", "cogging")
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), Execution(InProcess()))
+    constant, differing, gravity, other = ((name, "motor") for name in names)
+    rounds, accepted = list[Round](), list[Key]()
+    for keys in ([constant, differing, gravity], [other]):
+        rounds.append(round_of(bench, keys))
+        done = rounds[-1].accepted
+        assert done is not None
+        bench, accepted = bench.at(done.fitted), [*accepted, done.key]
+    assert gravity in [item.key for item in rounds[0].choice.aliases]
+    current, told, kept = exchanged(bench.base, bench.current, rounds, accepted, LEVEL, np.random.default_rng(0))
+    first = told[0].choice
+    assert {item.key for item in first.aliases} == {item.key for item in first.same} == {constant, differing}
+    assert kept == [first.rivals[0].key, other] == [first.aliases[0].key, other]
+    chances = dict(zip((item.key for item in first.rivals), first.probabilities, strict=True))
+    assert chances[gravity] < LEVEL < chances[differing] < chances[constant]
+    assert sum(chances.values()) == pytest.approx(sum(rounds[0].choice.probabilities))
+    assert current.cost < rounds[0].before.cost
