@@ -16,6 +16,8 @@ from friction_ocp.friction.composite import Bristle, with_bristle
 from friction_ocp.friction.element import LoadDependence
 from friction_ocp.parameters import Free
 
+REACHES, RUNG = (1e-4, 1e-3, 1e-2, 5e-2), 10.0
+"""Deflections at breakaway over the travel at which a bristle is tried, and how far apart they are at most."""
 DAMPED, OVERDAMPED = 0.2, 100.0
 """Damping of a bristle over that at which its shaft no longer swings on it: as it is tried, and at most."""
 
@@ -36,7 +38,7 @@ class PreslidingEffect(AbstractEffect):
         lifted = _lifted(drive, clues, place)
         breakaway = _breakaway({**clues.numbers, **lifted}, place) or 0.1 * clues.typical_torque[place]
         travel = max(float(np.ptp(track.theta[place])) for track in clues.tracks)
-        stiffnesses = [breakaway / max(share * travel, 1e-300) for share in (1e-4, 1e-3, 1e-2, 5e-2)]
+        stiffnesses = [breakaway / max(share * travel, 1e-300) for share in REACHES]
         aperiodic = [2.0 * float(np.sqrt(item * clues.numbers[f"{place}.inertia"])) for item in stiffnesses]
         bristle = Bristle(
             Free(stiffnesses[1], 1e-2 * stiffnesses[-1], 1e3 * stiffnesses[0]),
@@ -59,14 +61,15 @@ def _breakaway(numbers: Mapping[str, float], place: str) -> float:
 
 
 def _lifted(drive: Drive, clues: Clues, place: str) -> dict[str, float]:
-    """Return the guesses of dry friction that are above what was fitted, by path.
+    """Return the guesses of dry friction of which the fit has left next to nothing, by path.
 
-    Friction that gives way like a spring looks like none to a model in which it jumps with the sign of the speed: of
-    too little of it a bristle has nothing to carry, whatever its stiffness.
+    Friction that gives way like a spring looks like none to a model in which it jumps with the sign of the speed; then
+    a bristle has nothing to carry, whatever its stiffness. Where it is off by less than a rung, another reach makes up
+    for it.
     """
     leaves = {leaf.path: leaf.value for leaf in drive_leaves(drive) if leaf.path.startswith(f"{place}.friction.tau_")}
     guesses = {path: value.guess for path, value in leaves.items() if isinstance(value, Free)}
-    return {path: guess for path, guess in guesses.items() if guess > clues.numbers.get(path, guess)}
+    return {path: guess for path, guess in guesses.items() if guess > RUNG * clues.numbers.get(path, guess)}
 
 
 class LoadDependenceEffect(AbstractEffect):
