@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model, slopes_at, typical_inputs
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
-linalg: Any = _linalg  # its own types are incomplete
-
+SHORT, TERMS = 0.5, 18
+"""Span times slope from which a Taylor series of so many terms is exact to rounding."""
 ALIKE = 0.01
 """Relative difference of lengths of segments whose gaps are equally wide: the noise is not known better."""
 MOVES_ALIKE = float(np.log(2.0))
@@ -25,33 +22,34 @@ def unit_covariances(model: Model, numbers: FloatArray, spans: FloatArray, at: F
     About the states `at` (spans, states) and without dry friction; `numbers` are those of the drive.
     """
     mech = model.drive.mechanism
-    slopes = slopes_at(model.drive, numbers, typical_inputs(model.problem, model.drive), list(at))
-    states = at.shape[1]
-    found = np.zeros((len(mech.topology.roots), spans.size, states, states))
+    slopes = np.array(slopes_at(model.drive, numbers, typical_inputs(model.problem, model.drive), list(at)))
+    power = np.zeros((len(mech.topology.roots), at.shape[1], at.shape[1]))
     for k, group in enumerate(mech.free_groups):
-        power = np.zeros((states, states))
-        power[len(mech.angle_groups) + k, len(mech.angle_groups) + k] = 1.0
-        for j, (span, slope) in enumerate(zip(spans, slopes, strict=True)):
-            found[group, j] = _gathered(slope, power, float(span))
-    return found
+        power[group, len(mech.angle_groups) + k, len(mech.angle_groups) + k] = 1.0
+    return _gathered(slopes.reshape(spans.size, *power.shape[1:]), power, spans)
 
 
-def _gathered(slope: FloatArray, power: FloatArray, span: float) -> FloatArray:
-    """Return P after a span, s, from dP/dt = A P + P A' + power, P = 0, with A the slope.
+def _gathered(slopes: FloatArray, power: FloatArray, spans: FloatArray) -> FloatArray:
+    """Return P (groups, spans, n, n) after spans, s, from dP/dt = A P + P A' + Q, P = 0; A = slopes (spans, n, n).
 
-    Over a short span by one exponential (Van Loan 1978), which overflows where something decays fast, then doubled:
-    P(2 t) = P(t) + e^(A t) P(t) e^(A' t).
+    Over a short span by the Taylor series P = sum t^k / k! L^(k - 1)(Q), L(X) = A X + X A', then doubled:
+    P(2 t) = P(t) + e^(A t) P(t) e^(A' t), which does not overflow where something decays fast.
     """
-    states, size = slope.shape[0], float(np.linalg.norm(slope, 1)) * span
-    doublings = max(0, int(np.ceil(np.log2(max(size, 1.0)))))
-    whole = np.block([[-slope, power], [np.zeros_like(slope), slope.T]])
-    wide = np.asarray(linalg.expm(whole * span / 2**doublings), dtype=np.float64)
-    carried = wide[states:, states:].T
-    found = carried @ wide[:states, states:]
+    size = float(np.max(np.abs(slopes).sum(axis=1).max(axis=1) * spans, initial=0.0))
+    doublings = max(0, int(np.ceil(np.log2(max(size / SHORT, 1.0)))))
+    short = (spans / 2**doublings)[:, None, None]
+    along, identity = slopes * short, np.eye(slopes.shape[1])
+    term, carried = power[:, None] * short, np.broadcast_to(identity, along.shape)
+    found: FloatArray = term
+    power_of: FloatArray = carried
+    for k in range(1, TERMS):
+        term = (along @ term + term @ np.swapaxes(along, 1, 2)) / (k + 1)
+        power_of = power_of @ along / k
+        found, carried = found + term, carried + power_of
     for _ in range(doublings):
-        found = found + carried @ found @ carried.T
+        found = found + carried @ found @ np.swapaxes(carried, 1, 2)
         carried = carried @ carried
-    return 0.5 * (found + found.T)
+    return 0.5 * (found + np.swapaxes(found, 2, 3))
 
 
 def motions_of(model: Model, numbers: FloatArray, item: Experiment, nodes: IntArray) -> FloatArray:
