@@ -13,8 +13,8 @@ from friction_ocp.drive.stepping import stepped
 from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_space
 from friction_ocp.estimation.static_points import StaticTerm, static_term
-from friction_ocp.simulation.grid import FloatArray
-from friction_ocp.simulation.kernel import Piece, SweepRequest, empty_result
+from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.kernel import SweepRequest
 from friction_ocp.simulation.sweep import Sweep
 
 
@@ -74,35 +74,35 @@ class Contrast:
 
         States that the base model does not have go on from segment to segment.
         """
-        started = [self._started(index, theta) for index, theta in wanted]
-        names, outputs = self.sweep.drive.state_names, len(self.sweep.drive.output_names)
+        requests = [self._started(index, theta) for index, theta in wanted]
+        shared, extra = self._states
+        tracks: list[Track] = []
+        for request, result in zip(requests, self.sweep.run_many(requests), strict=True):
+            nodes = request.x0.copy()
+            nodes[1:, extra] = result.end[:-1, extra]
+            tracks.append(Track(result.y, result.end[:, shared], nodes))
+        return tracks
+
+    @property
+    def _states(self) -> tuple[list[int], IntArray]:
+        """Return the states that the base model has, in its order, and those that it does not have."""
+        names = self.sweep.drive.state_names
         shared = [names.index(name) for name in self.base.program.drive.state_names]
-        extra = np.setdiff1d(np.arange(len(names)), shared)
-        runs = [(request, empty_result(request, len(names), outputs, 0)) for request in started]
-        counts = [len(request.x0) for request in started]
-        if not extra.size:
-            self.sweep.run_pieces([Piece(*run, 0, count) for run, count in zip(runs, counts, strict=True)])
-        for j in range(max(counts, default=0) if extra.size else 0):
-            going = [run for run, count in zip(runs, counts, strict=True) if j < count]
-            self.sweep.run_pieces([Piece(*run, j, j + 1) for run in going])
-            for request, result in going:
-                request.x0[j + 1 : j + 2, extra] = result.end[j, extra]
-        return [Track(result.y, result.end[:, shared], request.x0) for request, result in runs]
+        return shared, np.setdiff1d(np.arange(len(names)), shared)
 
     def _started(self, index: int, theta: FloatArray) -> SweepRequest:
         """Return the simulation of a recording from the nodes of the base model."""
         item, drive = self.base.recordings[index], self.sweep.drive
-        names = drive.state_names
-        shared = [names.index(name) for name in self.base.program.drive.state_names]
+        shared, extra = self._states
         own = seen_by(self.model, drive, item.item)
         numbers = self.space.numbers(theta, own.name)
         width = np.zeros(len(drive.mechanism.topology.roots) + 1)
-        nodes = np.zeros((item.cut.count, len(names)))
-        if len(shared) < len(names):
+        nodes = np.zeros((item.cut.count, len(drive.state_names)))
+        if extra.size:
             at = own.signals(int(item.cut.first[0]))
             nodes[0] = np.asarray(self.sweep.start.call([*at, numbers])[0]).ravel()
         nodes[:, shared] = item.nodes
-        return SweepRequest(own.grid, item.cut.first, nodes, numbers, width)
+        return SweepRequest(own.grid, item.cut.first, nodes, numbers, width, carried=extra if extra.size else None)
 
 
 def contrast(model: Model, base: LinearProgram, drive: Drive) -> Contrast:

@@ -20,11 +20,12 @@ from itertools import pairwise
 from pathlib import Path
 
 from friction_ocp.drive.stepping import SteppedDrive
+from friction_ocp.simulation.chained import chained
 from friction_ocp.simulation.kernel import AbstractKernel, Piece
 from friction_ocp.simulation.lane_code import chain_code, lane_code
 from friction_ocp.simulation.maps import SweepMap, delay_indices, sweep_maps
 from friction_ocp.simulation.parts import parts_of
-from friction_ocp.simulation.segment_table import Addresses, SegmentTable, alike, course_table, segment_table, shares
+from friction_ocp.simulation.segment_table import Addresses, alike, segment_table, shares
 
 FLAGS = (
     *("-O3", "-freciprocal-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno", "-fwrapv"),
@@ -47,26 +48,32 @@ class CompiledKernel(AbstractKernel):
         self._lanes = int(library.friction_ocp_lanes())
 
     def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
+        chains = [chained(piece) for piece in pieces]
         cuts = [parts_of(piece) for piece in pieces]
-        long = [cut for cut in cuts if cut is not None]
-        if long:
-            self._run(course_table([cut.piece for cut in long], [cut.course for cut in long]), False, threads)
-        parts = [cut.cut() for cut in long]
-        for group in alike([*parts, *(piece for piece, cut in zip(pieces, cuts, strict=True) if cut is None)]):
-            self._run(segment_table(group), group[0].request.derivatives, threads)
-        for cut, part in zip(long, parts, strict=True):
-            cut.join(part.into)
+        self._run([cut.ahead() for cut in cuts if cut is not None], threads)
+        works = [
+            chain.run() if chain is not None else cut.cut() if cut is not None else piece
+            for piece, chain, cut in zip(pieces, chains, cuts, strict=True)
+        ]
+        self._run(works, threads)
+        for work, chain, cut in zip(works, chains, cuts, strict=True):
+            if chain is not None:
+                chain.write_ends(work.into)
+            if cut is not None:
+                cut.join(work.into)
 
-    def _run(self, table: SegmentTable, derivatives: bool, threads: int) -> None:
-        order = table.order()
-        steps, rows = table.steps[order], table.rows[order]
-        count = max(1, min(threads, int(steps.sum()) // STEPS_WORTH_A_THREAD))
-        cuts = shares(steps, self._lanes, count)
-        works = [(rows[begin:stop], derivatives) for begin, stop in pairwise(cuts) if stop > begin]
-        if len(works) > 1:
-            list(_pool(threads).map(self._simulate, works))
-        else:
-            self._simulate(works[0])
+    def _run(self, pieces: Sequence[Piece], threads: int) -> None:
+        for group in alike(pieces):
+            table, derivatives = segment_table(group), group[0].request.derivatives
+            order = table.order()
+            steps, rows = table.steps[order], table.rows[order]
+            count = max(1, min(threads, int(steps.sum()) // STEPS_WORTH_A_THREAD))
+            cuts = shares(steps, self._lanes, count)
+            works = [(rows[begin:stop], derivatives) for begin, stop in pairwise(cuts) if stop > begin]
+            if len(works) > 1:
+                list(_pool(threads).map(self._simulate, works))
+            else:
+                self._simulate(works[0])
 
     def _simulate(self, work: tuple[Addresses, bool]) -> None:
         rows, derivatives = work

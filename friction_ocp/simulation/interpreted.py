@@ -79,7 +79,10 @@ class InterpretedKernel(AbstractKernel):
         for j in range(begin, stop):
             closes = j == len(request.first) - 2
             plan = schedule(request.grid, int(request.first[j]), int(request.first[j + 1]), closes)
-            track = self._course(request, request.x0[j], plan.controls)
+            start = request.x0[j].copy()
+            if request.carried is not None and j > begin:
+                start[request.carried] = into.end[j - 1, request.carried]
+            track = self._course(request, start, plan.controls)
             into.end[j] = track[: self._states, -1]
             if into.dend is not None:
                 into.dend[j] = self._sensitivities(track[:, -1:])[0]

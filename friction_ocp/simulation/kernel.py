@@ -38,6 +38,8 @@ class SweepRequest:
     """(groups + 1,) smoothing; zeros are exact."""
     derivatives: bool = False
     with_states: bool = False
+    carried: IntArray | None = None
+    """States that go on where the segment before ended, the others beginning anew; without derivatives only."""
     yardstick: Yardstick | None = None
     """With it the sweep sums a score over each segment in place of keeping every derivative of its outputs."""
 
@@ -81,6 +83,12 @@ class Piece:
     """Its `dend` is a view of memory in the order (segments, columns, states)."""
     begin: int
     stop: int
+    course: FloatArray | None = None
+    """(n, states), to be filled with the states before the ticks of each node."""
+    resets: FloatArray | None = None
+    """(n, states) states from each node on, before its ticks; NaN where they go on."""
+    observed: bool = True
+    """Whether outputs are wanted."""
 
     @property
     def steps(self) -> IntArray:

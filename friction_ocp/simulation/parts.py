@@ -29,7 +29,13 @@ class Parts:
     owner: IntArray
     """(parts,) the segment of the piece that each part belongs to."""
     course: FloatArray
-    """(n, states), to be filled with the states before the ticks of each node."""
+    """(n, states) states before the ticks of each node, once the piece was simulated without derivatives."""
+
+    def ahead(self) -> Piece:
+        """Return what is to be simulated first: the states alone."""
+        plain = replace(self.piece.request, derivatives=False, with_states=False, yardstick=None)
+        into = SweepResult(self.piece.into.y, np.empty_like(self.piece.into.end))
+        return Piece(plain, into, self.piece.begin, self.piece.stop, self.course, observed=False)
 
     def cut(self) -> Piece:
         """Return the parts as a piece, once the course is known; its outputs are those of the whole."""

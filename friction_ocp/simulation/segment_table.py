@@ -36,24 +36,16 @@ class SegmentTable:
 def alike(pieces: Sequence[Piece]) -> Iterable[list[Piece]]:
     """Group pieces from which the same is wanted."""
 
-    def wanted(piece: Piece) -> tuple[bool, bool, bool]:
+    def wanted(piece: Piece) -> tuple[bool, bool, bool, bool]:
         request = piece.request
-        return request.derivatives, request.with_states, request.yardstick is None
+        return request.derivatives, request.with_states, request.yardstick is None, piece.observed
 
     return (list(group) for _, group in groupby(sorted(pieces, key=wanted), key=wanted))
 
 
 def segment_table(pieces: Sequence[Piece]) -> SegmentTable:
     """Return the rows of all segments of some pieces."""
-    return _joined([_table(piece, None) for piece in pieces])
-
-
-def course_table(pieces: Sequence[Piece], courses: Sequence[FloatArray]) -> SegmentTable:
-    """Return the rows with which nothing but states (nodes, states) before the ticks of each node are written."""
-    return _joined([_table(piece, course) for piece, course in zip(pieces, courses, strict=True)])
-
-
-def _joined(tables: Sequence[SegmentTable]) -> SegmentTable:
+    tables = [_table(piece) for piece in pieces]
     return SegmentTable(
         np.concatenate([table.rows for table in tables]),
         np.concatenate([table.steps for table in tables]),
@@ -61,7 +53,7 @@ def _joined(tables: Sequence[SegmentTable]) -> SegmentTable:
     )
 
 
-def _table(piece: Piece, course: FloatArray | None) -> SegmentTable:
+def _table(piece: Piece) -> SegmentTable:
     request, into, index = piece.request, piece.into, np.arange(piece.begin, piece.stop)
     grid, by = request.grid, request.yardstick
     begin, last = request.first[index], request.first[index + 1]
@@ -77,24 +69,18 @@ def _table(piece: Piece, course: FloatArray | None) -> SegmentTable:
     def own_row(array: FloatArray | None) -> Addresses:
         return _rows(array, index, kept)
 
-    if course is None:
-        score, loss = into.score, None if by is None else np.array([by.loss.code, by.loss.parameter], dtype=float)
-        compared = (at_nodes(None if by is None else by.measured), *map(same, (None if by is None else by.noise, loss)))
-        seen = tuple(map(at_nodes, (None, into.states, into.y, into.dy)))
-        ends = (into.end, None if into.dend is None else into.dend.transpose(0, 2, 1))
-        sums = (None, None, None) if score is None else (score.cost, score.gradient, score.square)
-    else:
-        compared, seen = tuple(map(same, (None, None, None))), tuple(map(at_nodes, (course, None, None, None)))
-        ends, sums = (np.empty_like(into.end), None), (None, None, None)
+    loss = None if by is None else np.array([by.loss.code, by.loss.parameter], dtype=float)
+    score = (None, None, None) if into.score is None else (into.score.cost, into.score.gradient, into.score.square)
     columns = [
         (last - begin + 1).astype(np.uintp),
         (index == len(request.first) - 2).astype(np.uintp),
         *map(at_nodes, (grid.dt, grid.substeps, grid.ticks, grid.at_start, grid.at_end, grid.at_node)),
         *map(same, (np.asarray(request.p, dtype=float), np.asarray(request.width, dtype=float))),
         own_row(np.asarray(request.x0, dtype=float)),
-        *compared,
-        *seen,
-        *map(own_row, (*ends, *sums)),
+        *map(at_nodes, (piece.resets, None if by is None else by.measured)),
+        *map(same, (None if by is None else by.noise, loss)),
+        *map(at_nodes, (piece.course, into.states, into.y if piece.observed else None, into.dy)),
+        *map(own_row, (into.end, None if into.dend is None else into.dend.transpose(0, 2, 1), *score)),
     ]
     return SegmentTable(np.column_stack(columns), piece.steps, tuple(kept))
 

@@ -18,6 +18,7 @@
 /* One segment: its grid, inputs, parameters and start; what it is compared with; where its results go. Pointers are at
    its first node. The closing node is the next segment's first: only the last segment, which `closes` its recording,
    ticks and writes it.
+   resets (n x NX, states from a node on, NaN where they go on) may be NULL.
    Samples (n x NY, NaN where there is none), noise floors and the loss, its kind and parameter (kernel.py), or NULL.
    course (n x NX, states before the ticks of a node), states (n x NX, after them), y (n x NY) and dy (n x NY x NC) may
    be NULL; end (NX), dend (NX x NC, column major) with sensitivities; cost, gradient (NC) and square (NC x NC) where
@@ -27,7 +28,7 @@ typedef struct {
   const double *dt;
   const long *substeps, *ticks;
   const double *u0, *u1, *un;
-  const double *p, *width, *x0;
+  const double *p, *width, *x0, *resets;
   const double *measured, *noise, *loss;
   double *course, *states, *y, *dy, *end, *dend, *cost, *gradient, *square;
 } segment;
@@ -235,15 +236,24 @@ static void finish(const group *now) {
   }
 }
 
+/* Note where the lanes are before the ticks of node k, and set what begins anew there. */
+static void arrive(long k, group *now) {
+  for (int i = 0; i < now->live; ++i) {
+    const segment *at = now->at[i];
+    if (k >= at->n) continue;
+    for (int j = 0; j < NX && at->course; ++j) at->course[k * NX + j] = now->x[j][i];
+    for (int j = 0; j < NX && at->resets; ++j)
+      if (!isnan(at->resets[k * NX + j])) now->x[j][i] = at->resets[k * NX + j];
+  }
+}
+
 static void simulate(group *now) {
   long nodes = 0;
   begin(now);
   for (int i = 0; i < now->live; ++i)
     if (now->at[i]->n > nodes) nodes = now->at[i]->n;
   for (long k = 0; k < nodes; ++k) {
-    for (int i = 0; i < now->live; ++i)
-      if (now->at[i]->course && k < now->at[i]->n)
-        for (int j = 0; j < NX; ++j) now->at[i]->course[k * NX + j] = now->x[j][i];
+    arrive(k, now);
     tick(k, 2, now);
     tick(k, 1, now);
     for (int i = 0; i < LANES; ++i)

@@ -68,3 +68,22 @@ def test_neighbours_change_nothing(name: str) -> None:
         alone = sweep.run_many([request])[0]
         for key, value in arrays(alone).items():
             assert np.array_equal(value, arrays(beside)[key], equal_nan=True), key
+
+
+@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_carried_states_go_on(name: str, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Segments simulated one by one, each from where the one before left the carried states, give the same."""
+    if not compiled:
+        monkeypatch.setenv("CC", "none")
+    case = Case(DRIVES[name]())
+    sweep, request = Sweep(case.model, ()), case.request(np.random.default_rng(6), width=0.0, derivatives=False)
+    carried = np.arange(len(case.model.state_names))[::2]
+    found = sweep.run_many([replace(request, carried=carried)])[0]
+    x0 = request.x0.copy()
+    for segment in range(3):
+        alone = sweep.run_many([replace(request, x0=x0)])[0]
+        x0[segment + 1 : segment + 2, carried] = alone.end[segment, carried]
+    wanted = sweep.run_many([replace(request, x0=x0)])[0]
+    for key, value in arrays(wanted).items():
+        np.testing.assert_allclose(arrays(found)[key], value, rtol=1e-9, atol=1e-9, err_msg=key)
