@@ -100,13 +100,16 @@ class Cell:
 
 
 def gap_map(base: FittedModel, before: FreeErrors, after: FreeErrors) -> tuple[Cell, ...]:
-    """Return rms errors over noise floors by channel, recording and regime."""
+    """Return rms errors over noise floors by channel, recording and regime, of samples that both models account for.
+
+    A channel that is read earlier loses some.
+    """
     cells: list[Cell] = []
     for first, then in zip(before.runs, after.runs, strict=True):
         labels: IntArray = regimes(base.model, base.theta, first)
         for k, channel in enumerate(base.model.problem.drive.outputs):
             for code, regime in enumerate(REGIMES):
-                at = (labels == code) & np.isfinite(first.measured[:, k])
+                at = (labels == code) & np.isfinite(first.measured[:, k]) & np.isfinite(then.measured[:, k])
                 if np.any(at):
                     sizes = (_rms(run, k, at) / before.floors[k] for run in (first, then))
                     cells.append(Cell(channel.part, channel.name, first.name, regime, *sizes))

@@ -1,0 +1,32 @@
+"""Gaps of free runs by regime."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosis_cases import axis, write_case
+
+from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors, gap_map
+from friction_ocp.estimation.model import prepare
+from friction_ocp.problem_file.load import load_problem
+
+
+def test_samples_that_a_delay_loses_are_left_out_of_the_map(tmp_path: Path) -> None:
+    """A model that reads its channels earlier has none at the end; what the others say stays comparable."""
+    base = fit_base(prepare(load_problem(write_case(tmp_path, axis()))))
+    before = free_errors(base, held_out=False)
+
+    def without_end(errors: FreeErrors) -> FreeErrors:
+        runs = [replace(run, measured=run.measured.copy()) for run in errors.runs]
+        for run in runs:
+            run.measured[-5:] = np.nan
+        return replace(errors, runs=tuple(runs))
+
+    cells = gap_map(base, before, without_end(before))
+    assert len(cells) == len(gap_map(base, before, before))
+    for cell in cells:
+        assert np.isfinite(cell.before) and cell.before == pytest.approx(cell.after)
