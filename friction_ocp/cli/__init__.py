@@ -7,6 +7,8 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
+from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
+
 from friction_ocp.cli import (
     checking,
     diagnosing,
@@ -25,11 +27,16 @@ __all__ = ["DONE", "INTERRUPTED", "NOT_CONVERGED", "WRONG_INPUT", "main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status."""
+    """Run one command and return its exit status.
+
+    The linear algebra gets one thread: its matrices are small, and threads that wait for each other on a busy machine
+    take many times as long. Work is shared out by segments and by tasks.
+    """
     options = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        return options.run(options)
+        with threadpool_limits(1, user_api="blas"):
+            return options.run(options)
     except FrictionOcpError as error:
         for finding in error.findings:
             print(finding, file=sys.stderr)
