@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -83,7 +84,7 @@ class Contrast:
             tracks.append(Track(result.y, result.end[:, shared], nodes))
         return tracks
 
-    @property
+    @cached_property
     def _states(self) -> tuple[list[int], IntArray]:
         """Return the states that the base model has, in its order, and those that it does not have."""
         names = self.sweep.drive.state_names

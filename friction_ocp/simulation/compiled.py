@@ -25,6 +25,7 @@ from friction_ocp.simulation.kernel import AbstractKernel, Piece
 from friction_ocp.simulation.lane_code import chain_code, lane_code
 from friction_ocp.simulation.maps import SweepMap, delay_indices, sweep_maps
 from friction_ocp.simulation.parts import parts_of
+from friction_ocp.simulation.plan import AsItIs
 from friction_ocp.simulation.segment_table import Addresses, alike, segment_table, shares
 
 FLAGS = (
@@ -48,19 +49,12 @@ class CompiledKernel(AbstractKernel):
         self._lanes = int(library.friction_ocp_lanes())
 
     def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
-        chains = [chained(piece) for piece in pieces]
-        cuts = [parts_of(piece) for piece in pieces]
-        self._run([cut.ahead() for cut in cuts if cut is not None], threads)
-        works = [
-            chain.run() if chain is not None else cut.cut() if cut is not None else piece
-            for piece, chain, cut in zip(pieces, chains, cuts, strict=True)
-        ]
+        plans = [chained(piece) or parts_of(piece) or AsItIs(piece) for piece in pieces]
+        self._run([first for plan in plans if (first := plan.ahead()) is not None], threads)
+        works = [plan.work() for plan in plans]
         self._run(works, threads)
-        for work, chain, cut in zip(works, chains, cuts, strict=True):
-            if chain is not None:
-                chain.write_ends(work.into)
-            if cut is not None:
-                cut.join(work.into)
+        for plan, work in zip(plans, works, strict=True):
+            plan.finish(work.into)
 
     def _run(self, pieces: Sequence[Piece], threads: int) -> None:
         for group in alike(pieces):
@@ -198,7 +192,12 @@ def generated_source(drive: SteppedDrive, active: Sequence[int], values_only: bo
     code = [lane_code(function) for function in (*functions, *slopes.values())]
     code += [chain_code(name, slope) for name, slope in slopes.items()]
     table = _table(maps, delay_indices(drive), values_only)
-    return "\n".join((_c_code("lanes.h"), _c_code("lane_math.h"), defines, *code, MAP, table, _c_code("sweep.c")))
+    return "\n".join((lane_headers(), defines, *code, MAP, table, _c_code("sweep.c")))
+
+
+def lane_headers() -> str:
+    """Return the C code that all code of `lane_code` needs."""
+    return _c_code("lanes.h") + _c_code("lane_math.h")
 
 
 def _c_code(name: str) -> str:

@@ -51,6 +51,11 @@ class Grid:
         """(n,) interval lengths; the last is 0."""
         return np.append(np.diff(self.time), 0.0)
 
+    @cached_property
+    def steps_before(self) -> IntArray:
+        """(n + 1,) integrator steps before each node; the last entry is unused."""
+        return np.concatenate([[0], np.cumsum(self.substeps)])
+
     def between(self, k: int, share: float) -> FloatArray:
         """Return (inputs,) the inputs at a share of interval k."""
         return self.at_start[k] + share * (self.at_end[k] - self.at_start[k])

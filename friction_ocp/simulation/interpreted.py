@@ -71,16 +71,17 @@ class InterpretedKernel(AbstractKernel):
 
     def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
         for piece in pieces:
-            self._run(piece.request, piece.begin, piece.stop, piece.into)
+            self._run(piece.request, piece.into)
 
-    def _run(self, request: SweepRequest, begin: int, stop: int, into: SweepResult) -> None:
+    def _run(self, request: SweepRequest, into: SweepResult) -> None:
         tracks: list[FloatArray] = []
         instants: list[FloatArray] = []
-        for j in range(begin, stop):
+        segments = range(len(request.first) - 1)
+        for j in segments:
             closes = j == len(request.first) - 2
             plan = schedule(request.grid, int(request.first[j]), int(request.first[j + 1]), closes)
             start = request.x0[j].copy()
-            if request.carried is not None and j > begin:
+            if request.carried is not None and j > 0:
                 start[request.carried] = into.end[j - 1, request.carried]
             track = self._course(request, start, plan.controls)
             into.end[j] = track[: self._states, -1]
@@ -90,7 +91,7 @@ class InterpretedKernel(AbstractKernel):
             tracks.append(track[:, plan.node[seen]])
             instants.append(plan.h[seen])
         if tracks:
-            self._observe(request, range(begin, stop), np.concatenate(instants), np.hstack(tracks), into)
+            self._observe(request, segments, np.concatenate(instants), np.hstack(tracks), into)
 
     def _course(self, request: SweepRequest, x0: FloatArray, controls: FloatArray) -> FloatArray:
         """Return the state, its sensitivities and the unknown torques before and after every operation."""

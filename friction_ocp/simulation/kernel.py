@@ -76,13 +76,11 @@ class SweepResult:
 
 @dataclass(frozen=True)
 class Piece:
-    """Segments `begin` .. `stop` - 1 of a request, and the result that they belong to."""
+    """A request and its result, and what else is wanted of the simulation."""
 
     request: SweepRequest
     into: SweepResult
     """Its `dend` is a view of memory in the order (segments, columns, states)."""
-    begin: int
-    stop: int
     course: FloatArray | None = None
     """(n, states), to be filled with the states before the ticks of each node."""
     resets: FloatArray | None = None
@@ -93,9 +91,7 @@ class Piece:
     @property
     def steps(self) -> IntArray:
         """(segments,) how many integrator steps each segment takes."""
-        first = self.request.first[self.begin : self.stop + 1]
-        before = np.concatenate([[0], np.cumsum(self.request.grid.substeps)])
-        return np.diff(before[first])
+        return np.diff(self.request.grid.steps_before[self.request.first])
 
 
 class AbstractKernel(ABC):
@@ -103,7 +99,7 @@ class AbstractKernel(ABC):
 
     @abstractmethod
     def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:
-        """Simulate pieces and write their rows of their results, in several threads where that helps."""
+        """Simulate pieces and fill their results, in several threads where that helps."""
 
 
 def empty_result(request: SweepRequest, states: int, outputs: int, active: int) -> SweepResult:

@@ -57,7 +57,7 @@ class _Writer:
         self.held[register] = name
 
     def compute(self, operation: int, register: int, inputs: list[int]) -> None:
-        """Add an operation; raises NotImplementedError where it has no code."""
+        """Add an operation; raises RuntimeError where it has no code."""
         if operation in COMPARISONS:
             one, other = map(self.number, inputs)
             self.set(register, "m", f"(mask)({one} {COMPARISONS[operation]} {other})")
@@ -79,21 +79,18 @@ def _numeric(operation: int, inputs: list[str]) -> str:
         return f"lanes_{AT_ONCE[operation]}({', '.join(inputs)})"
     if operation in ONE_BY_ONE:
         return f"lanes_{ONE_BY_ONE[operation]}({', '.join(inputs)}, live)"
-    raise NotImplementedError(f"CasADi's operation {operation}")
+    raise RuntimeError(f"CasADi's operation {operation} has no code for lanes")
 
 
 def lane_code(function: ca.Function) -> str:
     """Return the C code of a function: `static void NAME(arg, res, live)`, of vectors or the nonzeros of matrices.
 
-    Raises NotImplementedError for an operation that has no code here.
+    Raises RuntimeError, as CasADi's own generator does, for an operation that has no code; such models are interpreted.
     """
     writer = _Writer()
     for k in range(function.n_instructions()):
-        operation, inputs, outputs = (
-            function.instruction_id(k),
-            function.instruction_input(k),
-            function.instruction_output(k),
-        )
+        operation, inputs = function.instruction_id(k), function.instruction_input(k)
+        outputs = function.instruction_output(k)
         if operation == ca.OP_CONST:
             writer.set(outputs[0], "v", f"splat({_literal(function.instruction_constant(k))})")
         elif operation == ca.OP_INPUT:

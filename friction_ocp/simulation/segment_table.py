@@ -54,9 +54,9 @@ def segment_table(pieces: Sequence[Piece]) -> SegmentTable:
 
 
 def _table(piece: Piece) -> SegmentTable:
-    request, into, index = piece.request, piece.into, np.arange(piece.begin, piece.stop)
+    request, into = piece.request, piece.into
     grid, by = request.grid, request.yardstick
-    begin, last = request.first[index], request.first[index + 1]
+    begin, last, index = request.first[:-1], request.first[1:], np.arange(len(request.first) - 1)
     kept: list[npt.NDArray[np.generic]] = []
 
     def at_nodes(array: FloatArray | IntArray | None) -> Addresses:
@@ -73,7 +73,7 @@ def _table(piece: Piece) -> SegmentTable:
     score = (None, None, None) if into.score is None else (into.score.cost, into.score.gradient, into.score.square)
     columns = [
         (last - begin + 1).astype(np.uintp),
-        (index == len(request.first) - 2).astype(np.uintp),
+        (index == index[-1]).astype(np.uintp),
         *map(at_nodes, (grid.dt, grid.substeps, grid.ticks, grid.at_start, grid.at_end, grid.at_node)),
         *map(same, (np.asarray(request.p, dtype=float), np.asarray(request.width, dtype=float))),
         own_row(np.asarray(request.x0, dtype=float)),

@@ -38,7 +38,9 @@ typedef struct {
   const segment *at[LANES];
   const map *output;
   int live, derivatives;
-  lanes x[NX + 1], s[NX * NC + 1], u[NU + 1], p[NP + 1], width[NW + 1], h, step_torques[NL + 1], output_torques[NL + 1];
+  mask writing; /* lanes that write the node that they are at */
+  lanes x[NX + 1], s[NX * NC + 1], u[NU + 1], held[NU + 1], p[NP + 1], width[NW + 1], h;
+  lanes step_torques[NL + 1], output_torques[NL + 1];
   lanes cost, gradient[NC + 1], square[NC * NC + 1];
   const lanes *arg[7];
   lanes *res[3];
@@ -68,8 +70,6 @@ static void solve(const map *m, mask searching, lanes *torques, group *now) {
 static void evaluate(const map *m, mask some, lanes *torques, int derivatives, group *now) {
   if (m->unknowns) solve(m, some, torques, now);
   now->res[0] = now->value;
-  now->res[1] = now->a;
-  now->res[2] = now->b;
   (derivatives ? m->derivative : m->value)(now->arg, now->res, now->live);
 }
 
@@ -78,9 +78,10 @@ static void replace(int count, const lanes *from, lanes *into, mask where, int e
   for (int i = 0; i < count && !everywhere; ++i) into[i] = blend(where, from[i], into[i]);
 }
 
-/* Advance states and sensitivities of some lanes by a map; now->arg holds the arguments. */
-static void advance(const map *m, mask some, group *now) {
+/* Advance states and sensitivities of some lanes by a map under inputs; now->arg holds its other arguments. */
+static void advance(const map *m, mask some, const lanes *inputs, group *now) {
   int all = !any(~some);
+  now->arg[1] = inputs;
   evaluate(m, some, now->step_torques, now->derivatives, now);
   if (now->derivatives) {
     m->chain(now->a, now->b, now->s, now->moved);
@@ -92,20 +93,32 @@ static void advance(const map *m, mask some, group *now) {
 /* A row of a table (n x columns) of each segment, at its node k or its last. */
 static inline long row_of(const segment *at, long k) { return k < at->n ? k : at->n - 1; }
 
-/* Tick the lanes whose node k has this bit; the closing node only where the segment closes the recording. */
-static void tick(long k, long bit, group *now) {
-#ifdef TICK
-  lanes kind = splat((double)bit);
-  mask some = {0};
+/* Come to node k: note where the lanes are, and set what begins anew there, its inputs and which lanes write it, the
+   closing node only where the segment closes the recording. */
+static void arrive(long k, group *now) {
   for (int i = 0; i < LANES; ++i) {
     const segment *at = now->at[i];
     long row = row_of(at, k);
-    some[i] = -(long long)(k + !at->closes < at->n && (at->ticks[row] & bit));
-    for (int j = 0; j < NU; ++j) now->u[j][i] = at->un[row * NU + j];
+    now->writing[i] = -(long long)(k + !at->closes < at->n);
+    for (int j = 0; j < NU; ++j) now->held[j][i] = at->un[row * NU + j];
+    if (i >= now->live || k >= at->n) continue;
+    for (int j = 0; j < NX && at->course; ++j) at->course[k * NX + j] = now->x[j][i];
+    for (int j = 0; j < NX && at->resets; ++j)
+      if (!isnan(at->resets[k * NX + j])) now->x[j][i] = at->resets[k * NX + j];
   }
+}
+
+/* Tick the lanes whose node k has this bit. */
+static void tick(long k, long bit, group *now) {
+#ifdef TICK
+  lanes kind = splat((double)bit);
+  mask some = now->writing;
+  for (int i = 0; i < LANES; ++i)
+    if (!(now->at[i]->ticks[row_of(now->at[i], k)] & bit)) some[i] = 0;
   if (!any(some)) return;
-  now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &kind;
-  advance(&TICK, some, now);
+  now->arg[3] = &kind;
+  advance(&TICK, some, now->held, now);
+  now->arg[3] = &now->h;
 #endif
 }
 
@@ -130,12 +143,12 @@ static inline double cost_of(const double *loss, double r, double *weight) {
 }
 
 /* Compare output i at node k; with derivatives its sensitivities are in now->moved (NY x NC, column major). */
-static void compare(long k, int i, mask seen, group *now) {
+static void compare(long k, int i, group *now) {
   lanes weight = splat(0.0), error = splat(0.0), scale = splat(0.0), v[NC + 1];
   int compared = 0;
   for (int lane = 0; lane < now->live; ++lane) {
     const segment *at = now->at[lane];
-    double sample = seen[lane] ? at->measured[k * NY + i] : NAN, how_much;
+    double sample = now->writing[lane] ? at->measured[k * NY + i] : NAN, how_much;
     if (!isfinite(sample)) continue;
     compared = 1;
     scale[lane] = 1.0 / at->noise[i];
@@ -156,31 +169,23 @@ static void compare(long k, int i, mask seen, group *now) {
 static void observe(long k, group *now) {
   const segment *first = now->at[0];
   int derivatives = now->derivatives && (first->dy || first->measured);
-  mask seen = {0};
-  if (!first->states && !first->y) return;
-  for (int i = 0; i < LANES; ++i) {
-    const segment *at = now->at[i];
-    long row = row_of(at, k);
-    seen[i] = -(long long)(i < now->live && k + !at->closes < at->n);
-    for (int j = 0; j < NU; ++j) now->u[j][i] = at->un[row * NU + j];
-  }
   for (int i = 0; i < now->live; ++i)
-    if (seen[i] && now->at[i]->states)
+    if (now->writing[i] && now->at[i]->states)
       for (int j = 0; j < NX; ++j) now->at[i]->states[k * NX + j] = now->x[j][i];
   if (!first->y || NY == 0) return;
-  now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &now->h, now->arg[4] = now->width;
-  evaluate(now->output, seen, now->output_torques, derivatives, now);
+  now->arg[1] = now->held;
+  evaluate(now->output, now->writing, now->output_torques, derivatives, now);
   if (derivatives) now->output->chain(now->a, now->b, now->s, now->moved);
   for (int i = 0; i < now->live; ++i) {
     const segment *at = now->at[i];
-    if (!seen[i]) continue;
+    if (!now->writing[i]) continue;
     for (int j = 0; j < NY; ++j) at->y[k * NY + j] = now->value[j][i];
     if (derivatives && at->dy)
       for (int j = 0; j < NY; ++j)
         for (int c = 0; c < NC; ++c) at->dy[(k * NY + j) * NC + c] = now->moved[c * NY + j][i];
   }
   if (first->measured)
-    for (int i = 0; i < NY; ++i) compare(k, i, seen, now);
+    for (int i = 0; i < NY; ++i) compare(k, i, now);
 }
 
 /* Advance all lanes through interval k, each by its own steps. */
@@ -198,12 +203,13 @@ static void cross(long k, group *now) {
       for (int j = 0; j < NU; ++j)
         now->u[j][i] = at->u0[row * NU + j] + share * (at->u1[row * NU + j] - at->u0[row * NU + j]);
     }
-    now->arg[0] = now->x, now->arg[1] = now->u, now->arg[2] = now->p, now->arg[3] = &now->h, now->arg[4] = now->width;
-    advance(&STEP, some, now);
+    advance(&STEP, some, now->u, now);
   }
 }
 
 static void begin(group *now) {
+  now->arg[0] = now->x, now->arg[2] = now->p, now->arg[3] = &now->h, now->arg[4] = now->width;
+  now->res[1] = now->a, now->res[2] = now->b;
   for (int i = 0; i < LANES; ++i) {
     const segment *at = now->at[i];
     for (int j = 0; j < NX; ++j) now->x[j][i] = at->x0[j];
@@ -233,17 +239,6 @@ static void finish(const group *now) {
       at->gradient[c] = now->gradient[c][i];
       for (int d = 0; d <= c; ++d) at->square[c * NC + d] = at->square[d * NC + c] = now->square[c * NC + d][i];
     }
-  }
-}
-
-/* Note where the lanes are before the ticks of node k, and set what begins anew there. */
-static void arrive(long k, group *now) {
-  for (int i = 0; i < now->live; ++i) {
-    const segment *at = now->at[i];
-    if (k >= at->n) continue;
-    for (int j = 0; j < NX && at->course; ++j) at->course[k * NX + j] = now->x[j][i];
-    for (int j = 0; j < NX && at->resets; ++j)
-      if (!isnan(at->resets[k * NX + j])) now->x[j][i] = at->resets[k * NX + j];
   }
 }
 

@@ -47,14 +47,8 @@ class Sweep:
     def run_many(self, requests: Sequence[SweepRequest]) -> list[SweepResult]:
         """Simulate several recordings, side by side where there is more than one processor."""
         results = [self._empty(request) for request in requests]
-        self.run_pieces(
-            [Piece(item, into, 0, len(item.first) - 1) for item, into in zip(requests, results, strict=True)]
-        )
+        self.kernel.run([Piece(*pair) for pair in zip(requests, results, strict=True)], worker_count())
         return results
-
-    def run_pieces(self, pieces: Sequence[Piece]) -> None:
-        """Simulate some segments of requests and write their rows of the results."""
-        self.kernel.run(pieces, worker_count())
 
     def _empty(self, request: SweepRequest) -> SweepResult:
         drive = self.drive

@@ -43,7 +43,7 @@ def test_compiled_equals_interpreted(name: str, width: float) -> None:
     for derivatives in (False, True):
         request = case.request(np.random.default_rng(4), width, derivatives)
         into = empty_result(request, len(case.model.state_names), len(case.model.output_names), len(case.active))
-        interpreted.run([Piece(request, into, 0, 3)])
+        interpreted.run([Piece(request, into)])
         assert_same(sweep.run_many([request])[0], into)
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from importlib.resources import files
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from friction_ocp.simulation.compiled import FLAGS, compiler, load_library, vector_flags
+from friction_ocp.simulation.compiled import FLAGS, compiler, lane_headers, load_library, vector_flags
 from friction_ocp.simulation.lane_code import lane_code
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -32,25 +31,13 @@ void apply(long count, const double *one, const double *two, double *out) {
 }
 """
 X, Y = ca.SX.sym("x"), ca.SX.sym("y")
-UNARY = {
-    "exp": (ca.exp, np.exp),
-    "expm1": (ca.expm1, np.expm1),
-    "log": (ca.log, np.log),
-    "log1p": (ca.log1p, np.log1p),
-    "tanh": (ca.tanh, np.tanh),
-    "sin": (ca.sin, np.sin),
-    "cos": (ca.cos, np.cos),
-    "atan": (ca.atan, np.arctan),
-    "sqrt": (ca.sqrt, np.sqrt),
-    "fabs": (ca.fabs, np.abs),
-    "sign": (ca.sign, np.sign),
-    "floor": (ca.floor, np.floor),
-    "ceil": (ca.ceil, np.ceil),
-}
+ALIKE = ("exp", "expm1", "log", "log1p", "tanh", "sin", "cos", "sqrt", "fabs", "sign", "floor", "ceil", "fmin", "fmax")
+"""Functions that CasADi and NumPy call the same."""
+SAME = {name: (getattr(ca, name), getattr(np, name)) for name in ALIKE}
+UNARY = {name: SAME[name] for name in ALIKE[:-2]} | {"atan": (ca.atan, np.arctan)}
 BINARY = {
+    **{name: SAME[name] for name in ALIKE[-2:]},
     "pow": (lambda x, y: x**y, np.power),
-    "fmin": (ca.fmin, np.fmin),
-    "fmax": (ca.fmax, np.fmax),
     "atan2": (ca.atan2, np.arctan2),
     "less": (lambda x, y: ca.if_else(x < y, x, 2.0 * y), lambda x, y: np.where(x < y, x, 2.0 * y)),
     "logic": (
@@ -64,8 +51,7 @@ def apply(value: ca.SX, one: np.ndarray, two: np.ndarray, width: tuple[str, ...]
     """Return a function of x and y, compiled for lanes of some width, at each pair of numbers."""
     program = compiler()
     assert program is not None
-    parts = [files("friction_ocp.simulation").joinpath(name).read_text() for name in ("lanes.h", "lane_math.h")]
-    source = "\n".join((*parts, lane_code(ca.Function("f", [X, Y], [value])), CALL))
+    source = "\n".join((lane_headers(), lane_code(ca.Function("f", [X, Y], [value])), CALL))
     library, out = load_library(source, program, folder, (*FLAGS, *width)), np.empty_like(one)
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (one, two, out)]
     library.apply(ctypes.c_long(one.size), *pointers)

@@ -51,7 +51,7 @@ def test_score_is_that_of_the_outputs(name: str, loss: AbstractLoss) -> None:
     assert scored.yardstick is not None
     wanted = expected(request, scored.yardstick, sweep.run_many([request])[0])
     interpreted = empty_result(scored, len(case.model.state_names), len(case.model.output_names), len(case.active))
-    InterpretedKernel(case.model, case.active).run([Piece(scored, interpreted, 0, 3)])
+    InterpretedKernel(case.model, case.active).run([Piece(scored, interpreted)])
     for result in (sweep.run_many([scored])[0], interpreted):
         score = result.score
         assert score is not None and result.dy is None
