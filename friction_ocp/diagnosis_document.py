@@ -16,7 +16,8 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.reading import corrections
-from friction_ocp.diagnosis.select import Rival, probabilities
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.select import probabilities
 from friction_ocp.diagnosis.worth import samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
@@ -167,24 +168,25 @@ def _round(diagnosis: Diagnosis, index: int) -> dict[str, Any]:
 
 
 def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[str, Any]:
-    own = _own(item.before, rival.fitted)
+    own = _own(item.before, rival)
     return {
         **_explained(rival.key),
         "probability": chance,
         "predicted_gain": _share(rival.screened.gain, available),
-        "refit_gain": _share(item.before.objective - rival.fitted.objective, available),
+        "refit_gain": _share(item.before.objective - rival.standing.objective, available),
         "heldout_gain": _share(float(np.sum(rival.gains)), available),
         "p_value": rival.screened.p_value,
-        "parameters": {name: value for name, value in rival.fitted.values.items() if name in own},
+        "parameters": {name: value for name, value in rival.standing.values.items() if name in own},
     }
 
 
-def _own(before: FittedModel, fitted: FittedModel) -> set[str]:
+def _own(before: FittedModel, rival: Rival) -> set[str]:
     """Return the parameters that an addition brings: new ones, or those whose stated values it takes back."""
-    new = set(fitted.values) - set(before.values)
+    new = set(rival.standing.values) - set(before.values)
     if new:
         return new
-    stated = [dict(zip(item.space.names, item.space.prior_std, strict=True)) for item in (before.model, fitted.model)]
+    spaces = (before.model.space, rival.fitted.model.space)
+    stated = [dict(zip(space.names, space.prior_std, strict=True)) for space in spaces]
     return {name for name, std in stated[0].items() if math.isfinite(std) and not math.isfinite(stated[1][name])}
 
 
@@ -197,7 +199,7 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     names = set[str]()
     for item in diagnosis.rounds:
         if item.accepted is not None and item.accepted.key == key:
-            names |= _own(item.before, item.accepted.fitted)
+            names |= _own(item.before, item.accepted)
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values

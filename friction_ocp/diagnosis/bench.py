@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,9 @@ from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, qui
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
-from friction_ocp.diagnosis.select import Rival
+from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
@@ -87,6 +88,11 @@ class Bench:
     def clues(self) -> Clues:
         """What the current model says about sizes."""
         return clues_of(self.current)
+
+    @cached_property
+    def standard(self) -> Standard:
+        """What additions to the current model are measured by."""
+        return Standard(self.current)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -167,6 +173,20 @@ def fit_base_model(workshop: Workshop) -> Json:
 
 
 @dataclass(frozen=True)
+class Refit:
+    """A candidate after a few steps."""
+
+    screened: Screened
+    point: Json
+    cost: float
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and component."""
+        return self.screened.key
+
+
+@dataclass(frozen=True)
 class Crew:
     """Hands out the work of one round and takes what comes back."""
 
@@ -182,28 +202,32 @@ class Crew:
         found = [self._screened(value) for value in values if value is not None]
         return sorted(found, key=lambda item: -item.gain)
 
-    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[tuple[Screened, FittedModel]]]:
-        """Return (blocks,) held-out costs of the current model, and candidates with their refits after a few steps.
+    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[Refit]]:
+        """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps.
 
         Candidates whose simulation breaks down on the way are left out.
         """
         tasks = [Task(f"{self.number}-held-out", held_out_costs)]
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
-        costs, *points = self._run("refits", tasks, 0.5)
-        pairs = zip(shortlist, points, strict=True)
-        seen = [(item, seat_candidate(self.bench, item, point)) for item, point in pairs if point is not None]
-        return restored(costs), seen
+        costs, *ends = self._run("refits", tasks, 0.5)
+        pairs = [(item, end) for item, end in zip(shortlist, ends, strict=True) if end is not None]
+        return restored(costs), [Refit(item, end["point"], restored(end["cost"])) for item, end in pairs]
 
-    def rivals(self, tried: Sequence[tuple[Screened, FittedModel]], without: FloatArray) -> list[Rival]:
+    def rivals(self, tried: Sequence[Refit], without: FloatArray) -> list[Rival]:
         """Return candidates whose refits are completed, with what they gain on recordings left out."""
         tasks = [
-            self._task("complete", item.key, complete_candidate, (screened_document(item), point_document(quick)))
-            for item, quick in tried
+            self._task("complete", refit.key, complete_candidate, (screened_document(refit.screened), refit.point))
+            for refit in tried
         ]
         values = self._run("completing refits", tasks, 0.75)
         return [
-            Rival(item, seat_candidate(self.bench, item, value["point"]), without - restored(value["costs"]))
-            for (item, _), value in zip(tried, values, strict=True)
+            Rival(
+                refit.screened,
+                restored(value["standing"], (Standing,)),
+                without - restored(value["costs"]),
+                partial(seat_candidate, self.bench, refit.screened, value["point"]),
+            )
+            for refit, value in zip(tried, values, strict=True)
         ]
 
     def _task(self, what: str, key: tuple[str, str], function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
@@ -243,14 +267,15 @@ def held_out_costs(bench: Bench) -> Json:
 def refit_candidate(bench: Bench, content: Json) -> Json:
     """Refit a candidate, a few steps; null where its simulation breaks down."""
     fitted = quick_refit(bench.current, restored_screened(bench, content))
-    return point_document(fitted) if fitted.holds else None
+    return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
 
 
 def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
-    """Refit a candidate from there to its end, and cost it on recordings left out."""
-    quick = seat_candidate(bench, restored_screened(bench, content), point)
-    fitted = completed(quick)
-    return {"point": point_document(fitted), "costs": plain(blocks_like(bench.current, fitted, bench.blocks))}
+    """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
+    fitted = completed(seat_candidate(bench, restored_screened(bench, content), point))
+    costs = blocks_like(bench.current, fitted, bench.blocks)
+    standing = Standing.of(fitted, bench.standard.is_material(fitted))
+    return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
 
 
 def seat_candidate(bench: Bench, item: Screened, point: Json) -> FittedModel:

@@ -16,7 +16,7 @@ from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_sp
 from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.kernel import SweepRequest
-from friction_ocp.simulation.sweep import Sweep
+from friction_ocp.simulation.sweep import Sweep, sweep_of
 
 
 @dataclass(frozen=True)
@@ -112,4 +112,4 @@ def contrast(model: Model, base: LinearProgram, drive: Drive) -> Contrast:
     space = parameter_space(replace(model.problem, drive=drive), after.parameter_names)
     known = dict(zip(model.space.names, base.point.theta, strict=True))
     static = tuple(static_term(use, drive, space) for use in model.problem.static)
-    return Contrast(model, base, space, Sweep(after, (), values_only=True), known, static)
+    return Contrast(model, base, space, sweep_of(drive, (), values_only=True), known, static)

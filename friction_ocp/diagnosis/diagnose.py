@@ -16,15 +16,17 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
+from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.reading import explains_more, other_reading
 from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
+from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Rival, Round, choose, shown, with_refused
+from friction_ocp.diagnosis.select import Round, choose, shown, with_refused
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, released
 from friction_ocp.diagnosis.worth import (
     Key,
-    Standard,
+    gain,
     innovations,
     places,
     required,
@@ -295,10 +297,11 @@ def _round(
     hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
     gap = power.significant(level)
     chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-    choice, standard = choose([], blocks, level, rng), Standard(current, enough)
+    parts = len(folds(current))
+    choice = choose([], blocks, parts, level, rng)
     for rivals in _completed(crew, chosen):
-        able = [item.key in again or standard.met_by(item) for item in rivals]
-        choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, level, rng)
+        able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
+        choice = choose([item for item, yes in zip(rivals, able, strict=True) if yes], blocks, parts, level, rng)
         choice = with_refused(choice, tuple(item for item, yes in zip(rivals, able, strict=True) if not yes))
         if choice.significant or not gap:
             break
@@ -318,7 +321,7 @@ def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
     if not refits:
         return
     current = crew.bench.current
-    hopes = [min(fitted.cost, current.cost - item.gain) for item, fitted in refits]
+    hopes = [min(refit.cost, current.cost - refit.screened.gain) for refit in refits]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
     order = sorted(range(len(hopes)), key=lambda k: hopes[k])
     pairs = [refits[k] for k in order]

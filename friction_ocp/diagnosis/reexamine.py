@@ -12,9 +12,10 @@ import numpy as np
 from friction_ocp.diagnosis.bench import blocks_like
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, without_addition
-from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.select import Choice, Rival, Round, choose, is_same, resamples
+from friction_ocp.diagnosis.rival import Rival, is_same
+from friction_ocp.diagnosis.select import Choice, Round, choose, resamples
 from friction_ocp.diagnosis.worth import Key, required
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.simulation.grid import FloatArray
@@ -72,7 +73,7 @@ def exchanged(
                 current, accepted, benchmark = swapped, keys, _Benchmark(swapped)
                 done[index] = replace(item, accepted=rival, choice=_turned(item.choice, rival))
                 break
-            tried.append(replace(rival, fitted=swapped, gains=gains))
+            tried.append(rival.refitted(swapped, gains))
         else:
             done[index] = _weighed_again(item, benchmark, tried, level, rng)
     return current, done, accepted
@@ -80,7 +81,7 @@ def exchanged(
 
 def _others(choice: Choice, accepted: Sequence[Key]) -> list[Rival]:
     others = [rival for rival in choice.rivals if rival.key not in accepted]
-    return sorted(others, key=lambda rival: rival.fitted.cost)[:TRIED]
+    return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
 
 
 def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequence[Key]) -> FittedModel:
@@ -89,7 +90,8 @@ def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequenc
     Or from where all but the rival are now, if that is nearer.
     """
     model = with_drive(base.model, with_additions(base, keys))
-    starts = [{**current.values, **rival.fitted.values}, {**rival.fitted.values, **current.values}]
+    alone = rival.standing.values
+    starts = [{**current.values, **alone}, {**alone, **current.values}]
     ends = [polished(model, base.footing, model.space.with_known(known), None) for known in starts]
     return completed(min(ends, key=lambda end: end.objective))
 
@@ -105,9 +107,9 @@ def _weighed_again(
         return item
     known = dict(zip((rival.key for rival in item.choice.rivals), item.choice.probabilities, strict=True))
     worth = np.full(benchmark.blocks.count, float(np.sum(item.accepted.gains)) / benchmark.blocks.count)
-    own = replace(item.accepted, fitted=benchmark.fitted, gains=worth)
+    own = item.accepted.refitted(benchmark.fitted, worth)
     others = [replace(rival, gains=worth + rival.gains) for rival in tried]
-    again = choose([own, *others], benchmark.blocks, level, rng)
+    again = choose([own, *others], benchmark.blocks, len(folds(benchmark.fitted)), level, rng)
     keys = {rival.key for rival in again.rivals}
     shared = sum(known[key] for key in keys)
     known |= {rival.key: shared * chance for rival, chance in zip(again.rivals, again.probabilities, strict=True)}

@@ -10,32 +10,15 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.held_out import folds
+from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 
 RESAMPLES = 2000
-TOLD = 3.0
-"""Log-likelihood between two sets of residuals from which recordings tell them apart: odds of 20 to 1."""
 SURE = 0.95
 """Probability that an alias set holds."""
 ENOUGH_RECORDINGS = 6
 """From which whole recordings are resampled."""
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A candidate that was refitted, and what it gains on recordings left out."""
-
-    screened: Screened
-    fitted: FittedModel
-    gains: FloatArray
-    """(blocks,) decrease of the held-out objective against the model without it."""
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """Effect and component."""
-        return self.screened.key
 
 
 @dataclass(frozen=True)
@@ -88,8 +71,8 @@ def resamples(blocks: Blocks, rng: np.random.Generator) -> FloatArray:
     return counts
 
 
-def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random.Generator) -> Choice:
-    """Weigh rivals by their held-out gains; `level` is the significance asked for.
+def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rng: np.random.Generator) -> Choice:
+    """Weigh rivals by their held-out gains, one of `parts` parts left out at a time; `level` is the significance.
 
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
@@ -101,7 +84,7 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, level: float, rng: np.random
     draws = resamples(blocks, rng)
     totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in rivals)])
     shares = _weights(totals).mean(axis=0)
-    chances = _shared(rivals, shares[1:], price(blocks, len(folds(rivals[0].fitted))))
+    chances = _shared(rivals, shares[1:], price(blocks, parts))
     order = sorted(range(len(rivals)), key=lambda k: -chances[k])
     ordered = [rivals[k] for k in order]
     best = totals[:, order[0] + 1]
@@ -126,12 +109,6 @@ def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:
     )
 
 
-def is_same(one: Rival, other: Rival) -> bool:
-    """Whether two rivals leave the same residuals, as far as a likelihood can tell."""
-    left = [item.fitted.linear.rows.residual[item.fitted.linear.rows.channel >= 0] for item in (one, other)]
-    return left[0].size == left[1].size and 0.5 * float(np.sum((left[0] - left[1]) ** 2)) < TOLD
-
-
 def price(blocks: Blocks, parts: int) -> float:
     """Return what a parameter costs beside the likelihood of what was held out.
 
@@ -149,9 +126,7 @@ def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[fl
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    weights = np.array(
-        [np.exp(-each * float(rival.fitted.theta.size) - float(_blames_sensor(rival))) for rival in rivals]
-    )
+    weights = np.array([np.exp(-each * len(rival.standing.values) - float(_blames_sensor(rival))) for rival in rivals])
     weights = weights / weights.max()
     shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
     found = list[float]()

@@ -10,8 +10,9 @@ from friction_ocp.diagnosis.bench import blocks_like
 from friction_ocp.diagnosis.blocks import blocks_of, stats
 from friction_ocp.diagnosis.fitting import FittedModel, freed, polished
 from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, Rival
+from friction_ocp.diagnosis.select import Choice
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.effects.effect import Augmentation
@@ -67,7 +68,7 @@ def released(current: FittedModel, item: Contradiction) -> tuple[FittedModel, Ch
     gains = blocks.sums(held_out(current)) - blocks_like(current, fitted, blocks)
     p_value = float(2.0 * stats.norm.sf(item.deviations))
     seen = Screened(item.effect, item.component, 0.5 * item.deviations**2, p_value, (), Augmentation(drive, {}, ()))
-    rival = Rival(seen, fitted, gains)
+    rival = Rival(seen, Standing.of(fitted), gains, lambda: fitted)
     odds = float(np.exp(-0.5 * item.deviations**2))
     return fitted, Choice((rival,), (1.0 / (1.0 + odds),), odds / (1.0 + odds), True, (rival,), (rival,))
 

@@ -12,8 +12,8 @@ from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
+from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Rival
 from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import candidates, effects
 
@@ -80,7 +80,7 @@ def samples(fitted: FittedModel) -> int:
 
 def gain(current: FittedModel, rival: Rival) -> float:
     """Return what a rival gains for certain: held out, but no more than where it was fitted."""
-    return min(float(np.sum(rival.gains)), current.cost - rival.fitted.cost)
+    return min(float(np.sum(rival.gains)), current.cost - rival.standing.cost)
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,6 @@ class Standard:
     """What an addition to a model is measured by; what that model itself leaves is looked at once, if at all."""
 
     current: FittedModel
-    enough: float
-    """Decrease of the objective that makes an addition an effect of its own."""
 
     @cached_property
     def _before(self) -> FreeErrors:
@@ -98,10 +96,6 @@ class Standard:
     @cached_property
     def _beyond(self) -> float:
         return innovations(self.current).beyond
-
-    def met_by(self, rival: Rival) -> bool:
-        """Whether a rival gains enough and matters."""
-        return gain(self.current, rival) >= self.enough and self.is_material(rival.fitted)
 
     def is_material(self, fitted: FittedModel) -> bool:
         """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.

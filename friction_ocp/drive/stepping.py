@@ -33,6 +33,7 @@ from friction_ocp.drive.start import start_state
 from friction_ocp.drive.torques import loops_after
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.friction.smoothing import expm1, tanh, where
+from friction_ocp.kept import kept
 
 INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
@@ -308,6 +309,7 @@ def _tick(mech: Mechanism, state: State, kind: ca.SX) -> ca.SX:
     return ca.vertcat(*kept, column(chosen))
 
 
+@kept(64)
 def stepped(drive: Drive) -> SteppedDrive:
     """Return the discrete-time functions of a drive."""
     mech = mechanism(drive)

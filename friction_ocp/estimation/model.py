@@ -22,7 +22,7 @@ from friction_ocp.estimation.parameter_space import ParameterSpace, parameter_sp
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.static_points import StaticTerm, static_term
 from friction_ocp.simulation.grid import FloatArray
-from friction_ocp.simulation.sweep import Sweep
+from friction_ocp.simulation.sweep import Sweep, sweep_of
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -89,7 +89,7 @@ def prepare(problem: Problem) -> Model:
     problem = _as_stamped(on_one_clock(problem))
     drive = stepped(problem.drive)
     space = parameter_space(problem, drive.parameter_names)
-    sweep = Sweep(drive, space.active)
+    sweep = sweep_of(problem.drive, tuple(space.active))
     max_step = problem.estimation.max_step or integrator_step(drive, space, problem)
     uses = [_try_experiment(use, drive, problem, max_step) for use in problem.recordings]
     findings = [finding for use in uses if isinstance(use, FrictionOcpError) for finding in use.findings]
@@ -182,7 +182,7 @@ def with_drive(model: Model, drive: Drive) -> Model:
     problem = replace(model.problem, drive=drive)
     after = stepped(drive)
     space = parameter_space(problem, after.parameter_names)
-    sweep = Sweep(after, space.active)
+    sweep = sweep_of(drive, tuple(space.active))
     max_step = model.max_step
     if model.problem.estimation.max_step is None:
         max_step = min(max_step, integrator_step(after, space, problem))

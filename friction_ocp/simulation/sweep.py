@@ -7,13 +7,15 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from friction_ocp.drive.stepping import SteppedDrive
+from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.kept import kept
 from friction_ocp.simulation.compiled import compile_sweep
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
 from friction_ocp.simulation.interpreted import InterpretedKernel
 from friction_ocp.simulation.kernel import AbstractKernel, Piece, SweepRequest, SweepResult, empty_result
 
-__all__ = ["Sweep", "SweepRequest", "SweepResult"]
+__all__ = ["Sweep", "SweepRequest", "SweepResult", "sweep_of"]
 
 
 class Sweep:
@@ -53,6 +55,12 @@ class Sweep:
     def _empty(self, request: SweepRequest) -> SweepResult:
         drive = self.drive
         return empty_result(request, len(drive.state_names), len(drive.output_names), len(self.active))
+
+
+@kept(64)
+def sweep_of(drive: Drive, active: tuple[int, ...], values_only: bool = False) -> Sweep:
+    """Return the sweep of a drive; the last ones are kept."""
+    return Sweep(stepped(drive), active, values_only)
 
 
 def worker_count() -> int:

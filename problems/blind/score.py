@@ -1,10 +1,11 @@
 """Score `friction-ocp diagnose` on blind cases.
 
-python problems/blind/score.py --seed N [--cases M] [--out DIR] [--baselines all|correlation|none] [--workers W]
+python problems/blind/score.py --seed N [--cases M] [--out DIR] [--baselines all|correlation|none]
+    [--workers W] [--jobs J]
 
 Makes the cases of a seed, diagnoses each through the command line, opens the answers, and prints the table; DIR gets
 score.json and confusion.png. What is on disk is not done again: a score that was stopped goes on at the case where it
-stood, and --cases can grow.
+stood, and --cases can grow. Times of --jobs 2 are those of diagnoses that shared the machine.
 
 Seeds. 1 to 999 are for development: their cases may be looked into, and what was changed for them makes them worthless
 as evidence. A report takes the date on which the code was frozen as its seed, YYYYMMDD, and is run once; any other seed
@@ -17,8 +18,11 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import date
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +71,16 @@ def score_case(case: Case, folder: Path, baselines: Sequence[str], workers: int 
     return judged, Checked(known["reached"], tuple(known["confirmed"]), known["baselines"])
 
 
+def scored(
+    case: Case, folder: Path, baselines: Sequence[str], workers: int
+) -> tuple[Judged, Checked | None, str | None]:
+    """Return what `score_case` finds, or the judgement of no answer and what the diagnosis complained of."""
+    try:
+        return *score_case(case, folder, baselines, workers), None
+    except Failed as error:
+        return judge(read_answer(folder, case.name), NOTHING), None, str(error)
+
+
 def _checked(case: Case, result: dict[str, Any], problem: Path, folder: Path) -> dict[str, Any]:
     """Return the shrinkage on fresh recordings and the confirmation of every rival in an alias set."""
     diagnosis, said = folder / "diagnoses" / case.name, named(result, 0.0)
@@ -90,6 +104,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path)
     parser.add_argument("--baselines", choices=list(CHOICES), default="all")
     parser.add_argument("--workers", type=int, default=2, help="processes of a diagnosis")
+    parser.add_argument("--jobs", type=int, default=1, help="cases side by side")
     options = parser.parse_args()
     try:
         what = purpose(options.seed)
@@ -99,18 +114,24 @@ def main() -> int:
     judged: list[Judged] = []
     checked: dict[str, Checked] = {}
     failed = 0
-    for index in range(options.cases):
-        case = make(options.seed, index, folder)
-        try:
-            row, checked[case.name] = score_case(case, folder, CHOICES[options.baselines], options.workers)
-        except Failed as error:
-            failed += 1
-            print(f"{case.name}  failed: {error}", flush=True)
-            row = judge(read_answer(folder, case.name), NOTHING)
-        judged.append(row)
-        print(f"{case.name}  {'right' if row.right else 'WRONG':<6} {row.seconds:5.0f} s", flush=True)
+    cases = [make(options.seed, index, folder) for index in range(options.cases)]
+    score = partial(scored, folder=folder, baselines=CHOICES[options.baselines], workers=options.workers)
+    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+        for case, (row, check, complaint) in zip(cases, pool.map(score, cases), strict=True):
+            if complaint is not None:
+                failed += 1
+                print(f"{case.name}  failed: {complaint}", flush=True)
+            if check is not None:
+                checked[case.name] = check
+            judged.append(row)
+            print(f"{case.name}  {'right' if row.right else 'WRONG':<6} {row.seconds:5.0f} s", flush=True)
     lines = summary(judged, checked, failed)
-    report(judged, lines, folder, f"seed {options.seed} ({what}), {len(judged)} cases")
+    report(
+        judged,
+        lines,
+        folder,
+        f"seed {options.seed} ({what}), {len(judged)} cases, {options.workers} processes, {options.jobs} side by side",
+    )
     return int(any(line.passed is False for line in lines))
 
 

@@ -14,9 +14,10 @@ from friction_ocp.diagnosis.bench import Bench, blocks_like, judged_alike, open_
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import completed, quick_refit
-from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reexamine import exchanged
-from friction_ocp.diagnosis.select import Rival, Round, choose
+from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.select import Round, choose
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Gravity
 from friction_ocp.effects.registry import effects
@@ -36,13 +37,13 @@ def rival(bench: Bench, key: Key) -> Rival:
     assert found is not None
     fitted = completed(quick_refit(bench.current, found))
     gains = bench.blocks.sums(held_out(bench.current)) - blocks_like(bench.current, fitted, bench.blocks)
-    return Rival(found, fitted, gains)
+    return Rival(found, Standing.of(fitted), gains, lambda: fitted)
 
 
 def round_of(bench: Bench, keys: list[Key]) -> Round:
     """Return the round in which the first of some candidates was accepted."""
     rivals = [rival(bench, key) for key in keys]
-    choice = choose(rivals, bench.blocks, LEVEL, np.random.default_rng(0))
+    choice = choose(rivals, bench.blocks, len(folds(bench.current)), LEVEL, np.random.default_rng(0))
     before = bench.current
     return Round((), choice, before, excess(before.linear.rows, bench.blocks), rivals[0])
 

@@ -1,0 +1,79 @@
+"""A candidate after its refit: numbers that it is weighed by, and the fit itself for whoever looks at it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.simulation.grid import FloatArray
+
+TOLD = 3.0
+"""Log-likelihood between two sets of residuals from which recordings tell them apart: odds of 20 to 1."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What is asked of every refit."""
+
+    cost: float
+    """What models are compared by where they were fitted (`FittedModel.cost`)."""
+    objective: float
+    size: float
+    """Root of the sum of squares of the channels' residuals."""
+    values: Mapping[str, float]
+    """Fitted values by name."""
+    material: bool = True
+    """Whether it takes away more than the floors are in doubt by; only a refit that is to be added is asked."""
+
+    @classmethod
+    def of(cls, fitted: FittedModel, material: bool = True) -> Standing:
+        """Look at a fit."""
+        size = float(np.linalg.norm(_errors(fitted)))
+        return cls(fitted.cost, fitted.objective, size, fitted.values, material)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A candidate that was refitted, and what it gains on recordings left out."""
+
+    screened: Screened
+    standing: Standing
+    gains: FloatArray
+    """(blocks,) decrease of the held-out objective against the model without it."""
+    seat: Callable[[], FittedModel]
+    """Sets up the fit, which takes longer than most rivals are worth."""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and component."""
+        return self.screened.key
+
+    @cached_property
+    def fitted(self) -> FittedModel:
+        """The fit."""
+        return self.seat()
+
+    def refitted(self, fitted: FittedModel, gains: FloatArray) -> Rival:
+        """Return the same candidate with another fit."""
+        return replace(self, standing=Standing.of(fitted), gains=gains, seat=lambda: fitted)
+
+
+def is_same(one: Rival, other: Rival) -> bool:
+    """Whether two rivals leave the same residuals, as far as a likelihood can tell.
+
+    Vectors of lengths that differ by more are further apart than that.
+    """
+    if 0.5 * (one.standing.size - other.standing.size) ** 2 >= TOLD:
+        return False
+    left = [_errors(item.fitted) for item in (one, other)]
+    return left[0].size == left[1].size and 0.5 * float(np.sum((left[0] - left[1]) ** 2)) < TOLD
+
+
+def _errors(fitted: FittedModel) -> FloatArray:
+    rows = fitted.linear.rows
+    return rows.residual[rows.channel >= 0]
