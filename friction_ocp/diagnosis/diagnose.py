@@ -23,7 +23,7 @@ from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Round, choose, shown, with_refused
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
-from friction_ocp.diagnosis.stated import contradictions, released
+from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.worth import (
     Key,
     gain,
@@ -192,7 +192,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             if not innovations(current).significant(level):
                 bench, rounds, accepted = _settled(bench, run, tell, rounds, accepted, level, rng)
                 break
-    current, checked = _checked(bench.current, level)
+    current, checked = _checked(bench.current, names, level)
     rounds, clues, left = [*rounds, *checked], clues_of(current), innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     return Diagnosis(
@@ -240,7 +240,7 @@ def _settled(
     return bench, rounds, accepted
 
 
-def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Round]]:
+def _checked(current: FittedModel, names: Sequence[str], level: float) -> tuple[FittedModel, list[Round]]:
     """Take back stated values that the model, once it leaves nothing but noise, contradicts.
 
     Before that they may be far off because they stand in for what is missing.
@@ -251,7 +251,7 @@ def _checked(current: FittedModel, level: float) -> tuple[FittedModel, list[Roun
         found = [] if power.significant(level) else contradictions(current)
         if not found:
             break
-        fitted, choice = released(current, found[0])
+        fitted, choice = corrected(current, found, names)
         rounds.append(Round((), choice, current, power, choice.rivals[0]))
         current = fitted
     return current, rounds

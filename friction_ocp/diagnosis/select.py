@@ -89,7 +89,7 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     ordered = [rivals[k] for k in order]
     best = totals[:, order[0] + 1]
     alone = bool(np.quantile(best, level) > 0)
-    sure = _needed([chances[k] for k in order])
+    sure = needed([chances[k] for k in order])
     aliases = [rival for k, rival in enumerate(ordered[:sure]) if k == 0 or float(np.sum(rival.gains)) > 0]
     some = bool(shares[0] < level / len(rivals))
     return Choice(
@@ -164,7 +164,7 @@ def _weights(totals: FloatArray) -> FloatArray:
     return likelihood / likelihood.sum(axis=1, keepdims=True)
 
 
-def _needed(chances: Sequence[float]) -> int:
+def needed(chances: Sequence[float]) -> int:
     """Return how many rivals, best first, hold what is sure of the probability that all of them have."""
     total, held, count = sum(chances), 0.0, 0
     while held < SURE * total and count < len(chances):

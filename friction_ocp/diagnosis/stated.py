@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from friction_ocp.diagnosis.bench import blocks_like
-from friction_ocp.diagnosis.blocks import blocks_of, stats
-from friction_ocp.diagnosis.fitting import FittedModel, freed, polished
+from friction_ocp.diagnosis.blocks import Blocks, blocks_of, stats
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.fitting import FittedModel, completed, freed, polished, quick_refit
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.rival import Rival, Standing
-from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice
+from friction_ocp.diagnosis.screen import Screened, screen
+from friction_ocp.diagnosis.select import Choice, needed
+from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.effects.effect import Augmentation
+from friction_ocp.effects.registry import candidates
+from friction_ocp.effects.torques import mode_of
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
 CONTRADICTED = 3.0
 """Prior deviations between stated and fitted value beyond which the stated one is wrong."""
+STATED = ("inertia_error", "parameter_error")
+"""Effects that take back values which a problem states as fixed."""
 _SENSOR = {"gain": "sensor_gain", "offset": "sensor_offset", "delay": "sensor_delay"}
 
 
@@ -40,7 +48,7 @@ class Contradiction:
 def contradictions(fitted: FittedModel) -> list[Contradiction]:
     """Return what lies beyond the limit in a fitted model, the farthest first."""
     space = fitted.model.space
-    distance: FloatArray = np.abs(fitted.theta - space.prior_mean) / space.prior_std
+    distance = _distance(fitted)
     drive = fitted.model.problem.drive
     found: dict[tuple[str, str], Contradiction] = {}
     for k in np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED)):
@@ -51,6 +59,20 @@ def contradictions(fitted: FittedModel) -> list[Contradiction]:
     return sorted(found.values(), key=lambda item: -item.deviations)
 
 
+def _distance(fitted: FittedModel) -> FloatArray:
+    """Return (parameters,) prior deviations between fitted and stated values.
+
+    What is stated as the inertia of a shaft may count what hangs on it by a spring, or not.
+    """
+    space, values = fitted.model.space, fitted.values
+    distance: FloatArray = np.abs(fitted.theta - space.prior_mean) / space.prior_std
+    for k, name in enumerate(space.names):
+        shaft, _, quantity = name.rpartition(".")
+        hung = values.get(f"{mode_of(shaft)}.{quantity}", 0.0)
+        distance[k] = min(distance[k], abs(values[name] + hung - space.prior_mean[k]) / space.prior_std[k])
+    return distance
+
+
 def _key(path: str, drive: Drive) -> tuple[str, str]:
     """Return effect and component of a parameter that is not as stated."""
     part, _, rest = path.partition(".")
@@ -59,18 +81,62 @@ def _key(path: str, drive: Drive) -> tuple[str, str]:
     return ("inertia_error" if rest == "inertia" else "parameter_error"), part
 
 
-def released(current: FittedModel, item: Contradiction) -> tuple[FittedModel, Choice]:
-    """Fit again without the priors that are contradicted; return the fit and the decision as a choice of one."""
-    drive = _without_priors(current.model.problem.drive, item)
-    model = with_drive(current.model, drive)
-    fitted = freed(polished(model, current.footing, current.theta, current.linear.point.nodes))
+def corrected(current: FittedModel, found: Sequence[Contradiction], names: Sequence[str]) -> tuple[FittedModel, Choice]:
+    """Fit again with the stated values of one part taken back, the one that leaves least; return fit and choice.
+
+    It is a part whose fitted values are far from what is stated for them, or one whose values are fixed: fitted ones
+    may have given way to it. Every value that is taken back costs what Schwarz 1978 asks for.
+    """
     blocks = blocks_of(current.linear.rows)
-    gains = blocks.sums(held_out(current)) - blocks_like(current, fitted, blocks)
-    p_value = float(2.0 * stats.norm.sf(item.deviations))
-    seen = Screened(item.effect, item.component, 0.5 * item.deviations**2, p_value, (), Augmentation(drive, {}, ()))
-    rival = Rival(seen, Standing.of(fitted), gains, lambda: fitted)
-    odds = float(np.exp(-0.5 * item.deviations**2))
-    return fitted, Choice((rival,), (1.0 / (1.0 + odds),), odds / (1.0 + odds), True, (rival,), (rival,))
+    each, without = 0.5 * float(np.log(blocks.count)), blocks.sums(held_out(current))
+    best = dict[Key, tuple[float, Rival]]()
+    for count, seen, fitted in [*_released(current, found), *_freed(current, blocks, found, names)]:
+        gains = without - blocks_like(current, fitted, blocks)
+        score = fitted.cost + count * each
+        if seen.key not in best or score < best[seen.key][0]:
+            best[seen.key] = score, Rival(seen, Standing.of(fitted), gains, partial(_itself, fitted))
+    scores, ordered = zip(*sorted(best.values(), key=lambda pair: pair[0]), strict=True)
+    weights = np.exp(scores[0] - np.array([*scores, max(current.cost, scores[0])]))
+    *chances, nothing = map(float, weights / weights.sum())
+    choice = Choice(ordered, tuple(chances), nothing, True, ordered[: needed(chances)], ordered[:1])
+    return ordered[0].fitted, choice
+
+
+def _itself(fitted: FittedModel) -> FittedModel:
+    return fitted
+
+
+def _released(current: FittedModel, found: Sequence[Contradiction]) -> Iterator[tuple[int, Screened, FittedModel]]:
+    """Yield fits without the priors that are contradicted, part by part, and how many values are taken back."""
+    for item in found:
+        drive = _without_priors(current.model.problem.drive, item)
+        model = with_drive(current.model, drive)
+        p_value = float(2.0 * stats.norm.sf(item.deviations))
+        seen = Screened(item.effect, item.component, 0.5 * item.deviations**2, p_value, (), Augmentation(drive, {}, ()))
+        fitted = freed(polished(model, current.footing, current.theta, current.linear.point.nodes))
+        yield len(item.names), seen, fitted
+
+
+def _freed(
+    current: FittedModel, blocks: Blocks, found: Sequence[Contradiction], names: Sequence[str]
+) -> Iterator[tuple[int, Screened, FittedModel]]:
+    """Yield fits with the fixed values of a part made free, part by part.
+
+    A score test does not tell which: it counts no priors. The way to where contradicted values are as stated is long
+    and curved, so fits begin there, too.
+    """
+    clues, model = clues_of(current), current.model
+    stated = dict(zip(model.space.names, map(float, model.space.prior_mean), strict=True))
+    wanted = current.values | {name: stated[name] for item in found for name in item.names}
+    for effect, place in candidates(model.problem.drive, [name for name in names if name in STATED]):
+        seen = screen(model, current.linear, blocks, effect, place, clues)
+        if seen is None or not seen.starts:
+            continue
+        near = quick_refit(current, seen)
+        far = polished(near.model, near.footing, near.model.space.with_known(near.values | wanted), None)
+        fitted = completed(min((near, far), key=lambda fit: fit.objective if fit.holds else np.inf))
+        if fitted.holds:
+            yield fitted.theta.size - current.theta.size, seen, fitted
 
 
 def _without_priors(drive: Drive, item: Contradiction) -> Drive:

@@ -55,6 +55,11 @@ class ConstantTorqueEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 
+def mode_of(shaft: str) -> str:
+    """Return the name of the inertia that hangs on a shaft by a spring once that effect is in."""
+    return f"{shaft}_mode"
+
+
 class StructuralModeEffect(AbstractEffect):
     """A further inertia on a spring."""
 
@@ -64,11 +69,11 @@ class StructuralModeEffect(AbstractEffect):
     def places(self, drive: Drive) -> Iterable[str]:
         taken = {shaft.name for shaft in drive.shafts}
         for shaft in moving_shafts(drive):
-            if not shaft.name.endswith("_mode") and f"{shaft.name}_mode" not in taken:
+            if not shaft.name.endswith(mode_of("")) and mode_of(shaft.name) not in taken:
                 yield shaft.name
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        shaft, mode = drive.shaft(place), f"{place}_mode"
+        shaft, mode = drive.shaft(place), mode_of(place)
         inertia = 0.1 * clues.numbers[f"{place}.inertia"]
         step = float(np.median(np.diff(clues.tracks[0].time)))
         longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
