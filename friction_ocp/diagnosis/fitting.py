@@ -136,9 +136,15 @@ def _from_afar(fitted: FittedModel, starts: Sequence[FloatArray]) -> FittedModel
 def _free_base(model: Model, rough: Footing) -> FittedModel:
     """Fit free runs by squares from the guesses, and from where loosely joined segments lead; the better end counts."""
     starts = [model.space.guess, _rough_answer(model)[1].theta]
-    best = min((polished(model, rough, theta, None, COARSE) for theta in starts), key=lambda end: end.objective)
+    best = min((_coarse(model, rough, theta) for theta in starts), key=lambda end: end.objective)
     foot = footing(model, best.theta)
     return freed(timed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes))))
+
+
+def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
+    program, theta = foot.training(model), model.space.clip(theta)
+    start = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    return polished(model, foot, theta, start.nodes, COARSE)
 
 
 def _from_rest(fitted: FittedModel) -> FittedModel:
