@@ -259,6 +259,17 @@ class Mechanism:
         return "current" if f"{motor.name}.current_command" in given else None
 
 
+FEEDBACK_DELAY = "controller.feedback_delay"
+"""The delay with which the controller sees its channel: that of the channel, and all of it where the samples of its
+recording are read earlier."""
+
+
+def has_late_feedback(drive: Drive) -> bool:
+    """Whether the controller sees its channel late."""
+    controller = drive.controller
+    return controller is not None and any(c.name == controller.feedback and c.delay != 0.0 for c in drive.channels)
+
+
 def mechanism(drive: Drive) -> Mechanism:
     """Turn a drive into symbols; every number of its live terms becomes a parameter named by its path.
 
@@ -266,6 +277,8 @@ def mechanism(drive: Drive) -> Mechanism:
     """
     live = live_terms(drive)
     parameters = {leaf.path: symbol(leaf.path) for leaf in drive_leaves(live)}
+    if has_late_feedback(live):
+        parameters[FEEDBACK_DELAY] = symbol(FEEDBACK_DELAY)
     bound = bind_drive(live, parameters)
     structure = topology(bound)
     prescribed = {structure.group_of[channel.part]: channel.signal for channel in drive.prescribing}

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, saturate
-from friction_ocp.drive.mechanism import Mechanism, Motion, column
+from friction_ocp.drive.mechanism import FEEDBACK_DELAY, Mechanism, Motion, column
 from friction_ocp.drive.parts import Controller, Motor
 from friction_ocp.friction.smoothing import sqrt, where
 
@@ -118,13 +118,17 @@ def lag_rates(mech: Mechanism, motion: Motion) -> ca.SX:
 
 
 def seen_by_controller(mech: Mechanism, motion: Motion) -> ControlSignals:
-    """Return what the controller sees through its feedback channel."""
+    """Return what the controller sees through its feedback channel.
+
+    The delay of an angle is expanded to first order by its speed; that of a speed is left out.
+    """
     controller = mech.drive.controller
     assert controller is not None
     channel = next(item for item in mech.drive.channels if item.name == controller.feedback)
     theta, omega = mech.shaft_angle(channel.part, motion), mech.shaft_speed(channel.part, motion)
     if channel.eccentricity is not None:
         theta, omega, _ = channel.eccentricity.seen((theta, omega, 0.0))
+    theta = theta - mech.parameters.get(FEEDBACK_DELAY, 0.0) * omega
     theta, omega = theta * channel.gain + channel.offset, omega * channel.gain
     angle, speed = mech.true_input("reference.theta"), mech.true_input("reference.omega")
     wanted = (0.0 if angle is None else angle, 0.0 if speed is None else speed)

@@ -55,6 +55,12 @@ class ConstantTorqueEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 
+HEARD = 4
+"""Frequencies of the missing torque at which a mode is tried."""
+BLUNT, SHARP = 0.1, 0.04
+"""Damping over inertia and angular frequency: of modes on a coarse grid, and of those that are heard ringing."""
+
+
 def mode_of(shaft: str) -> str:
     """Return the name of the inertia that hangs on a shaft by a spring once that effect is in."""
     return f"{shaft}_mode"
@@ -77,20 +83,22 @@ class StructuralModeEffect(AbstractEffect):
         inertia = 0.1 * clues.numbers[f"{place}.inertia"]
         step = float(np.median(np.diff(clues.tracks[0].time)))
         longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
-        rates = 2.0 * np.pi * np.geomspace(5.0 / longest, 0.1 / step, 12)
+        rates = [float(rate) for rate in 2.0 * np.pi * np.geomspace(5.0 / longest, 0.1 / step, 12)]
         stiffness, damping = f"{place}-{mode}.stiffness", f"{place}-{mode}.damping"
-        springs = [float(inertia * rate**2) for rate in rates]
+        springs = [inertia * rate**2 for rate in rates]
         joint = Transmission(
             place,
             mode,
             1.0,
             stiffness=Free(springs[6], 0.1 * springs[0], 10.0 * springs[-1]),
-            damping=Free(0.1 * inertia * float(rates[6]), 0.0, 10.0 * inertia * float(rates[-1])),
+            damping=Free(0.1 * inertia * rates[6], 0.0, 10.0 * inertia * rates[-1]),
         )
         body = Shaft(mode, Free(inertia, 1e-3 * inertia, 1e2 * inertia), motion=shaft.motion)
         added = replace(drive, shafts=(*drive.shafts, body), transmissions=(*drive.transmissions, joint))
+        heard = [2.0 * np.pi / period for period in clues.periods(place, "time")[:HEARD]]
+        tried = [*((rate, BLUNT) for rate in rates), *((rate, SHARP) for rate in heard if rates[0] < rate < rates[-1])]
         trials = tuple(
-            Trial(({f"{mode}.inertia": inertia},), {stiffness: spring, damping: float(0.1 * inertia * rate)})
-            for spring, rate in zip(springs, rates, strict=True)
+            Trial(({f"{mode}.inertia": inertia, stiffness: inertia * rate**2, damping: ratio * inertia * rate},))
+            for rate, ratio in tried
         )
         return Augmentation(added, {f"{mode}.inertia": 0.0}, trials)

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from friction_ocp.drive.mechanism import FEEDBACK_DELAY
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
@@ -140,6 +141,8 @@ def _table(
             table[path] = value
     table |= {name: symbol for name, symbol in symbols.items() if name not in table}
     resolved = resolve_ties(ties, table)
+    if drive.controller is not None and f"{drive.controller.feedback}.delay" in resolved:
+        resolved[FEEDBACK_DELAY] = resolved[f"{drive.controller.feedback}.delay"]
     if isinstance(use, RecordingUse):  # what is undone in the recording already is not the model's to do
         for channel, seconds in use.late.items():
             resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds
