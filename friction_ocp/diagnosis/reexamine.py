@@ -53,34 +53,39 @@ def exchanged(
 ) -> tuple[FittedModel, list[Round], list[Key]]:
     """Put rivals in the place of earlier additions where, beside the later ones, they explain more for certain.
 
-    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. Where
-    no rival explains more for certain, the rivals are weighed again: beside all that was missing then a small
-    difference looked like a large one.
+    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. A rival
+    that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed again:
+    beside all that was missing then a small difference looked like a large one.
     """
     done, benchmark = list(rounds), _Benchmark(current)
     for index, item in enumerate(done[:-1]):
-        key = item.accepted.key if item.accepted is not None else None
-        if key is None or accepted.count(key) != 1:
+        held = item.accepted
+        if held is None or accepted.count(held.key) != 1:
             continue
-        tried = list[Rival]()
-        for rival in _others(item.choice, accepted):
-            keys = [rival.key if other == key else other for other in accepted]
+        seen, tried = set[Key](), list[Rival]()
+        others = _others(item.choice, accepted)
+        while others:
+            rival = others.pop(0)
+            seen.add(rival.key)
+            keys = [rival.key if other == held.key else other for other in accepted]
             swapped = _fitted(base, current, rival, keys)
             if not swapped.holds:
                 continue
             gains = -benchmark.dearer(swapped)
-            if swapped.cost < current.cost and benchmark.certain(gains, level, rng):
-                current, accepted, benchmark = swapped, keys, _Benchmark(swapped)
-                done[index] = replace(item, accepted=rival, choice=_turned(item.choice, rival))
-                break
-            tried.append(rival.refitted(swapped, gains))
-        else:
-            done[index] = _weighed_again(item, benchmark, tried, level, rng)
+            more = swapped.cost < current.cost and benchmark.certain(gains, level, rng)
+            if more or benchmark.simpler(swapped):
+                seen.add(held.key)
+                held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
+                item = replace(item, accepted=rival, choice=_turned(item.choice, rival))
+                tried, others = list[Rival](), _others(item.choice, [*accepted, *seen])
+            else:
+                tried.append(rival.refitted(swapped, gains))
+        done[index] = _weighed_again(item, benchmark, tried, level, rng)
     return current, done, accepted
 
 
-def _others(choice: Choice, accepted: Sequence[Key]) -> list[Rival]:
-    others = [rival for rival in choice.rivals if rival.key not in accepted]
+def _others(choice: Choice, known: Sequence[Key]) -> list[Rival]:
+    others = [rival for rival in choice.rivals if rival.key not in known]
     return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
 
 
@@ -144,6 +149,11 @@ class _Benchmark:
     def dearer(self, other: FittedModel) -> FloatArray:
         """Return (blocks,) what another model costs more than this one."""
         return blocks_like(self.fitted, other, self.blocks) - self._costs
+
+    def simpler(self, other: FittedModel) -> bool:
+        """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
+        fewer = self.fitted.theta.size - other.theta.size
+        return fewer > 0 and other.cost - self.fitted.cost < 0.5 * float(np.log(self.blocks.count)) * fewer
 
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""
