@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
-from twin import Bench, Twin, worst
+from twin import Bench, Run, Twin, worst
 
 from friction_ocp.drive.parts import Channel, Controller, Drive, Motor, Shaft
 from friction_ocp.friction.element import FrictionElement
@@ -70,6 +70,24 @@ def test_a_sampled_loop_follows_the_plant(name: str) -> None:
     before = {"controller.previous1": 0.02, "controller.previous2": 0.02}
     truth, run = twin.run(2.0, before, controller.supply)
     assert worst(truth, run, "axis.theta", "axis.omega", "command") < STEP_ERROR
+
+
+def test_a_sampled_loop_sees_its_channel_as_late_as_it_is() -> None:
+    """A cascade whose encoder is late by 1.5 ms, three quarters of its period: to first order in the delay."""
+    late, expansion = 1.5e-3, 2e-4
+    controller = PlantController(type="cascade", kp=5.0, kd=0.3, ki=2.0, **SLOW, **LOOP)
+    motor = PlantMotor("drive", "axis", "current", torque_constant=0.5, resistance=2.0, controller="loop")
+    shaft = PlantShaft("axis", 0.01, PlantFriction("coulomb_viscous", tau_c=0.05, viscous=0.01))
+    runs = list[tuple[Run, Run]]()
+    for delay in (late, 0.0):
+        sensors = (
+            PlantSensor("seen", "axis.theta", controller.sample_time, delay=delay),
+            PlantSensor("command", "drive.current"),
+        )
+        plant = Plant((shaft,), (), (motor,), (controller,), sensors)
+        runs.append(Twin(plant, {"reference.theta": ANGLE, "reference.omega": SPEED}).run(2.0))
+    (truth, ours), (_, punctual) = runs
+    assert worst(truth, ours, "axis.theta") < expansion < 0.02 * worst(truth, punctual, "axis.theta")
 
 
 def servo(controller: Controller, motor: Motor) -> Bench:

@@ -217,6 +217,8 @@ class Bench:
     def __post_init__(self) -> None:
         made = stepped(self.drive)
         values = {leaf.path: getattr(leaf.value, "guess", leaf.value) for leaf in drive_leaves(self.drive)}
+        if self.drive.controller is not None:
+            values["controller.feedback_delay"] = values[f"{self.drive.controller.feedback}.delay"]
         object.__setattr__(self, "stepped", made)
         object.__setattr__(self, "numbers", np.array([float(values[name]) for name in made.parameter_names]))
 

@@ -11,10 +11,12 @@ from axes import COULOMB, ENCODER_NOISE, INERTIA, RATE, SECONDS, TORQUE_CONSTANT
 from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, steps_and_multisine
 
 from friction_ocp.drive.parts import Channel as DriveChannel
+from friction_ocp.drive.parts import Controller
 from friction_ocp.estimation.estimate import Estimate, identify, simulate
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.lateness import lateness, read_earlier
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.parameter_space import parameter_space
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.parameters import Free
 from friction_ocp.recording.recording import Channel, Recording
@@ -75,6 +77,19 @@ def test_a_delay_of_many_samples_is_found(fitted: Estimate) -> None:
     assert abs(found.value - ENCODER) < FAR * found.std_error < 0.1 * NODE
     for name in ("position", "shaking"):
         assert fitted.simulation.train_errors[name][0].noise_ratio == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_loop_sees_the_whole_delay_of_samples_that_are_read_earlier() -> None:
+    """What is undone in the recording still happens in the machine."""
+    problem = late(run(2), ENCODER, 0.0)
+    loop = replace(problem.drive, controller=Controller("p", "position", "torque", kp=1.0))
+    (use,) = problem.train
+    undone = 0.02
+    space = parameter_space(
+        replace(problem, drive=loop, train=(replace(use, late={"position": undone}),)),
+        ("position.delay", "controller.feedback_delay"),
+    )
+    assert space.numbers(space.guess, use.name) == pytest.approx([ENCODER - undone, ENCODER])
 
 
 def test_known_delays_are_undone() -> None:
