@@ -152,7 +152,7 @@ class _Benchmark:
 
     def simpler(self, other: FittedModel) -> bool:
         """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
-        fewer = self.fitted.theta.size - other.theta.size
+        fewer = self.fitted.determined - other.determined
         return fewer > 0 and other.cost - self.fitted.cost < 0.5 * float(np.log(self.blocks.count)) * fewer
 
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:

@@ -25,6 +25,8 @@ class Standing:
     objective: float
     size: float
     """Root of the sum of squares of the channels' residuals."""
+    determined: int
+    """Parameters that are not at a bound."""
     values: Mapping[str, float]
     """Fitted values by name."""
     material: bool = True
@@ -34,7 +36,7 @@ class Standing:
     def of(cls, fitted: FittedModel, material: bool = True) -> Standing:
         """Look at a fit."""
         size = float(np.linalg.norm(_errors(fitted)))
-        return cls(fitted.cost, fitted.objective, size, fitted.values, material)
+        return cls(fitted.cost, fitted.objective, size, fitted.determined, fitted.values, material)
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[fl
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    weights = np.array([np.exp(-each * len(rival.standing.values) - float(_blames_sensor(rival))) for rival in rivals])
+    weights = np.array([np.exp(-each * rival.standing.determined - float(_blames_sensor(rival))) for rival in rivals])
     weights = weights / weights.max()
     shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
     found = list[float]()

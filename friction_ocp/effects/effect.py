@@ -22,6 +22,8 @@ IntArray = npt.NDArray[np.int64]
 
 PEAKS = 4
 """Periods that are tried."""
+SHARP = 0.04
+"""Damping over inertia and angular frequency of what is heard ringing."""
 LINES, MOST_LINES = 600, 4000
 """Frequencies at which a spectrum is looked at."""
 NEIGHBOURS = 41
@@ -126,6 +128,14 @@ class Clues:
         fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
         lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
         return np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
+
+    def ringing(self, shaft: str, slowest: float, fastest: float) -> list[float]:
+        """Return angular frequencies, rad/s, at which the missing torque of a shaft is strongest, within limits.
+
+        Little damped parts answer to a narrow band, which a grid of frequencies misses.
+        """
+        rates = [2.0 * np.pi / period for period in self.periods(shaft, "time")]
+        return [rate for rate in rates if slowest < rate < fastest]
 
     def speed_quantiles(self, shaft: str, shares: Sequence[float]) -> list[float]:
         """Return speeds below which the shaft moves for the given shares of the time that it moves at all.

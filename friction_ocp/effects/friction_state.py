@@ -72,6 +72,12 @@ def _lifted(drive: Drive, clues: Clues, place: str) -> dict[str, float]:
     return {path: guess for path, guess in guesses.items() if guess > RUNG * clues.numbers.get(path, guess)}
 
 
+LOADED = 0.05
+"""Friction over transmitted torque at which load dependence is tried: gears lose a few percent."""
+MOST = 100.0
+"""Largest load dependence over that: a drive that holds itself needs 20 times as much."""
+
+
 class LoadDependenceEffect(AbstractEffect):
     """Friction grows with the transmitted torque."""
 
@@ -86,6 +92,16 @@ class LoadDependenceEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         shaft, path = drive.shaft(place), f"{place}.friction.load.coulomb"
-        element = replace(shaft.friction, load=LoadDependence(Free(0.05, 0.0, 5.0)))
+        element = replace(shaft.friction, load=LoadDependence(Free(LOADED, 0.0, MOST * LOADED)))
         added = change_shaft(drive, place, friction=element)
-        return Augmentation(added, {path: 0.0}, (Trial(({path: 0.05},)),))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: LOADED},)),))
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive whose drag grows with the torque, too."""
+        friction, path = drive.shaft(place).friction, f"{place}.friction.load.viscous"
+        if friction.load is None or friction.load.viscous != 0.0:
+            return None
+        drag = LOADED / clues.typical_speed(place)
+        load = replace(friction.load, viscous=Free(drag, 0.0, MOST * drag))
+        added = change_shaft(drive, place, friction=replace(friction, load=load))
+        return Augmentation(added, {path: 0.0}, (Trial(({path: drag},)),))

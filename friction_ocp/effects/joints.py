@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive, Hysteresis, KinematicError, Transmission
 from friction_ocp.effects.effect import (
+    SHARP,
     AbstractEffect,
     Augmentation,
     Clues,
@@ -56,19 +57,18 @@ class ComplianceEffect(AbstractEffect):
         far = clues.numbers[f"{item.to_shaft}.inertia"]
         inertia = near * far / max(near + far, 1e-300) or max(near, far)
         step = float(np.median(np.diff(clues.tracks[0].time)))
-        rates = 2.0 * np.pi * np.geomspace(0.01 / step, 0.2 / step, 5)
-        springs = [float(inertia * rate**2) for rate in rates]
-        damping = [float(0.2 * inertia * rate) for rate in rates]
+        rates = [float(rate) for rate in 2.0 * np.pi * np.geomspace(0.01 / step, 0.2 / step, 5)]
+        springs = [inertia * rate**2 for rate in rates]
+        damping = [0.2 * inertia * rate for rate in rates]
+        heard = clues.ringing(item.from_shaft, 0.1 * rates[0], rates[-1])
         added = change_transmission(
             drive,
             place,
             stiffness=Free(springs[2], 1e-2 * springs[0], 1e2 * springs[-1]),
             damping=Free(damping[2], 0.0, 1e2 * damping[-1]),
         )
-        trials = tuple(
-            Trial(({path: spring},), {f"{place}.damping": loss}, inverse=True)
-            for spring, loss in zip(springs, damping, strict=True)
-        )
+        tried = [*zip(springs, damping, strict=True), *((inertia * w**2, SHARP * inertia * w) for w in heard)]
+        trials = tuple(Trial(({path: spring},), {f"{place}.damping": loss}, inverse=True) for spring, loss in tried)
         return Augmentation(added, {path: np.inf}, trials)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive, ExternalTorque, Gravity, Shaft, Transmission
 from friction_ocp.effects.effect import (
+    SHARP,
     AbstractEffect,
     Augmentation,
     Clues,
@@ -55,10 +56,8 @@ class ConstantTorqueEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
 
-HEARD = 4
-"""Frequencies of the missing torque at which a mode is tried."""
-BLUNT, SHARP = 0.1, 0.04
-"""Damping over inertia and angular frequency: of modes on a coarse grid, and of those that are heard ringing."""
+BLUNT = 0.1
+"""Damping over inertia and angular frequency of modes on a coarse grid."""
 
 
 def mode_of(shaft: str) -> str:
@@ -95,8 +94,8 @@ class StructuralModeEffect(AbstractEffect):
         )
         body = Shaft(mode, Free(inertia, 1e-3 * inertia, 1e2 * inertia), motion=shaft.motion)
         added = replace(drive, shafts=(*drive.shafts, body), transmissions=(*drive.transmissions, joint))
-        heard = [2.0 * np.pi / period for period in clues.periods(place, "time")[:HEARD]]
-        tried = [*((rate, BLUNT) for rate in rates), *((rate, SHARP) for rate in heard if rates[0] < rate < rates[-1])]
+        tried = [(rate, BLUNT) for rate in rates]
+        tried += [(rate, SHARP) for rate in clues.ringing(place, rates[0], rates[-1])]
         trials = tuple(
             Trial(({f"{mode}.inertia": inertia, stiffness: inertia * rate**2, damping: ratio * inertia * rate},))
             for rate, ratio in tried
