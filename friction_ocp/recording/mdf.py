@@ -21,13 +21,14 @@ def open_mdf(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
     """List the channels of an MDF file; a name that several groups have is followed by its group."""
     asammdf: Any = library("asammdf", "asammdf", "mdf", path)
     with opened(path, KIND, lambda: asammdf.MDF(path)) as file:
-        places = [
-            (group, index)
-            for group, content in enumerate(file.groups)
-            for index in range(len(content.channels))
-            if index != file.masters_db.get(group)
-        ]
-        signals = tuple(_signal(file, *place) for place in places)
+        with reading(path, KIND):
+            places = [
+                (group, index)
+                for group, content in enumerate(file.groups)
+                for index in range(len(content.channels))
+                if index != file.masters_db.get(group)
+            ]
+            signals = tuple(_signal(file, *place) for place in places)
 
         def read(wanted: Sequence[int]) -> Mapping[int, Values]:
             with reading(path, KIND):

@@ -1,14 +1,17 @@
 """Files are read in a child process first: damage that hangs or kills a library of others takes the child alone.
 
-The child is a fork, limited in processor time and memory, and what it reads is thrown away. Where there is no fork
-(Windows) files are read without it.
+The child is a fork, limited in processor time and memory. What it reads is thrown away; where it refuses a file that is
+the answer, for a library that has read damage once may not survive it twice. Where there is no fork (Windows) files are
+read without it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import faulthandler
 import functools
+import json
 import os
 import signal
 import sys
@@ -70,12 +73,17 @@ def _size(path: Path) -> int:
 def _probe(path: Path, read: Callable[[], object]) -> None:
     """Read in a child; raises FrictionOcpError if it did not come back."""
     seconds = SECONDS + _size(path) // BYTES_PER_SECOND
+    receiving, sending = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of forks beside threads: the child only reads a file
         child = os.fork()
     if child == 0:
-        _read_and_leave(read, seconds)
+        os.close(receiving)
+        _read_and_leave(read, seconds, sending)
+    os.close(sending)
     try:
+        with os.fdopen(receiving, "r", encoding="utf-8") as pipe:
+            refusal = pipe.read()
         _, status = os.waitpid(child, 0)
     except BaseException:
         with contextlib.suppress(OSError):
@@ -90,10 +98,12 @@ def _probe(path: Path, read: Callable[[], object]) -> None:
     if os.WEXITSTATUS(status) == _TOO_LARGE:
         what = f"reading it takes more memory than the {free_memory() / 1e9:.3g} GB that are free"
         raise FrictionOcpError(Finding(str(path), what, remedy="split the file, or " + remedy))
+    if refusal:
+        raise FrictionOcpError([Finding(**item) for item in json.loads(refusal)])
 
 
-def _read_and_leave(read: Callable[[], object], seconds: int) -> None:
-    """Read and end the process, whatever happens, without a word."""
+def _read_and_leave(read: Callable[[], object], seconds: int, sending: int) -> None:
+    """Read and end the process, whatever happens, without a word but why the file is refused."""
     status = _REFUSED
     try:
         _probing.append(True)
@@ -106,6 +116,8 @@ def _read_and_leave(read: Callable[[], object], seconds: int) -> None:
         status = _SOUND
     except FrictionOcpError as error:
         status = _TOO_LARGE if isinstance(error.__cause__, MemoryError) else _REFUSED
+        with os.fdopen(sending, "w", encoding="utf-8") as pipe:
+            json.dump([dataclasses.asdict(finding) for finding in error.findings], pipe)
     except MemoryError:
         status = _TOO_LARGE
     except BaseException:
