@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
@@ -109,15 +109,6 @@ class Bench:
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind what is built: model functions belong to their process."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
-
-
-def judged_alike(model: Model) -> Model:
-    """Return a model that states over what time its free runs are judged, and with it all that it is compared with.
-
-    Gravity that is added would hold a drive that drifts, and a further mode is faster than those that were there.
-    """
-    options = replace(model.problem.estimation, horizon_s=horizon(model))
-    return replace(model, problem=replace(model.problem, estimation=options))
 
 
 def point_document(fitted: FittedModel) -> Json:

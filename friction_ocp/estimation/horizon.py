@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from friction_ocp.drive.parts import Drive
@@ -23,6 +25,16 @@ def horizon(model: Model) -> float | None:
     if is_held(model.problem.drive):
         return None
     return min(LONGEST_WINDOW, PERIODS * slowest_period(model.drive, model.space, model.problem))
+
+
+def judged_alike(model: Model) -> Model:
+    """Return a model that states over what time its free runs are judged, and with it all that it is compared with.
+
+    Gravity that is added would hold a drive that drifts, a further mode is faster than those that were there, and other
+    guesses make other periods.
+    """
+    options = replace(model.problem.estimation, horizon_s=horizon(model))
+    return replace(model, problem=replace(model.problem, estimation=options))
 
 
 def fits_free_run(model: Model) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from friction_ocp.estimation.estimate import Estimate, conclude
 from friction_ocp.estimation.fit import settled
+from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.progress import Progress, silent
@@ -53,7 +54,7 @@ def fit_guess(workshop: Workshop, progress: Progress = silent) -> Json:
 
 def fit_start(workshop: Workshop, start: Sequence[float]) -> Json:
     """Fit a problem from other values than its guesses; priors and bounds stay."""
-    model = workshop.model
+    model = judged_alike(workshop.model)
     return _optimum(replace(model, space=model.space.moved(np.array(start, dtype=np.float64)))).document()
 
 

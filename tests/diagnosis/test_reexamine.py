@@ -10,7 +10,7 @@ import pytest
 from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, write_case
 from plant import PlantFriction, PlantRipple
 
-from friction_ocp.diagnosis.bench import Bench, blocks_like, judged_alike, open_bench, screen
+from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench, screen
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import completed, quick_refit
@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.select import Round, choose
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Gravity
 from friction_ocp.effects.registry import effects
-from friction_ocp.estimation.horizon import fits_free_run, horizon
+from friction_ocp.estimation.horizon import fits_free_run, horizon, judged_alike
 from friction_ocp.estimation.model import prepare, with_drive
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
