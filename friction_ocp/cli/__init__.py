@@ -22,6 +22,7 @@ from friction_ocp.cli import (
 )
 from friction_ocp.cli.options import DONE, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT, Parser
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.execution.processes import LINEAR_ALGEBRA, environment
 
 __all__ = ["DONE", "INTERRUPTED", "NOT_CONVERGED", "WRONG_INPUT", "main"]
 
@@ -30,12 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status.
 
     The linear algebra gets one thread: its matrices are small, and threads that wait for each other on a busy machine
-    take many times as long. Work is shared out by segments and by tasks.
+    take many times as long, and round otherwise than workers do. Work is shared out by segments and by tasks.
     """
     options = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        with threadpool_limits(1, user_api="blas"):
+        with environment(LINEAR_ALGEBRA), threadpool_limits(1, user_api="blas"):
             return options.run(options)
     except FrictionOcpError as error:
         for finding in error.findings:

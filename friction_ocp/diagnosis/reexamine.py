@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, wit
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Choice, Round, choose, resamples
+from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz
 from friction_ocp.diagnosis.worth import Key, required
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.simulation.grid import FloatArray
@@ -153,7 +153,7 @@ class _Benchmark:
     def simpler(self, other: FittedModel) -> bool:
         """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
         fewer = self.fitted.determined - other.determined
-        return fewer > 0 and other.cost - self.fitted.cost < 0.5 * float(np.log(self.blocks.count)) * fewer
+        return fewer > 0 and other.cost - self.fitted.cost < schwarz(self.blocks) * fewer
 
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""

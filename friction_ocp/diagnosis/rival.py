@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -50,6 +50,11 @@ class Rival:
     seat: Callable[[], FittedModel]
     """Sets up the fit, which takes longer than most rivals are worth."""
 
+    @classmethod
+    def of(cls, screened: Screened, fitted: FittedModel, gains: FloatArray) -> Rival:
+        """Return a candidate whose fit is set up already."""
+        return cls(screened, Standing.of(fitted), gains, lambda: fitted)
+
     @property
     def key(self) -> tuple[str, str]:
         """Effect and component."""
@@ -62,7 +67,7 @@ class Rival:
 
     def refitted(self, fitted: FittedModel, gains: FloatArray) -> Rival:
         """Return the same candidate with another fit."""
-        return replace(self, standing=Standing.of(fitted), gains=gains, seat=lambda: fitted)
+        return Rival.of(self.screened, fitted, gains)
 
 
 def is_same(one: Rival, other: Rival) -> bool:

@@ -118,7 +118,12 @@ def price(blocks: Blocks, parts: int) -> float:
     for the error of parameters fitted to the other parts (Stone 1977).
     """
     charged = 0.5 + 0.5 * parts / max(parts - 1, 1)
-    return max(0.5 * float(np.log(max(blocks.count, 1))) - charged, 0.0)
+    return max(schwarz(blocks) - charged, 0.0)
+
+
+def schwarz(blocks: Blocks) -> float:
+    """Return what a parameter costs beside the likelihood of what models were fitted to (Schwarz 1978)."""
+    return 0.5 * float(np.log(max(blocks.count, 1)))
 
 
 def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -13,9 +12,9 @@ from friction_ocp.diagnosis.blocks import Blocks, blocks_of, stats
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, freed, polished, quick_refit
 from friction_ocp.diagnosis.held_out import held_out
-from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened, screen
-from friction_ocp.diagnosis.select import Choice, needed
+from friction_ocp.diagnosis.select import Choice, needed, schwarz
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
@@ -88,22 +87,18 @@ def corrected(current: FittedModel, found: Sequence[Contradiction], names: Seque
     may have given way to it. Every value that is taken back costs what Schwarz 1978 asks for.
     """
     blocks = blocks_of(current.linear.rows)
-    each, without = 0.5 * float(np.log(blocks.count)), blocks.sums(held_out(current))
+    each, without = schwarz(blocks), blocks.sums(held_out(current))
     best = dict[Key, tuple[float, Rival]]()
     for count, seen, fitted in [*_released(current, found), *_freed(current, blocks, found, names)]:
         gains = without - blocks_like(current, fitted, blocks)
         score = fitted.cost + count * each
         if seen.key not in best or score < best[seen.key][0]:
-            best[seen.key] = score, Rival(seen, Standing.of(fitted), gains, partial(_itself, fitted))
+            best[seen.key] = score, Rival.of(seen, fitted, gains)
     scores, ordered = zip(*sorted(best.values(), key=lambda pair: pair[0]), strict=True)
     weights = np.exp(scores[0] - np.array([*scores, max(current.cost, scores[0])]))
     *chances, nothing = map(float, weights / weights.sum())
     choice = Choice(ordered, tuple(chances), nothing, True, ordered[: needed(chances)], ordered[:1])
     return ordered[0].fitted, choice
-
-
-def _itself(fitted: FittedModel) -> FittedModel:
-    return fitted
 
 
 def _released(current: FittedModel, found: Sequence[Contradiction]) -> Iterator[tuple[int, Screened, FittedModel]]:

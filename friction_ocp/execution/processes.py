@@ -22,7 +22,9 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.execution.executor import AbstractExecutor
 from friction_ocp.execution.task import Outcome, Task, attempt
 
-ONE_THREAD = {name: "1" for name in ("FRICTION_OCP_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+LINEAR_ALGEBRA = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+"""Environment in which libraries of linear algebra that are loaded later get one thread."""
+ONE_THREAD = {"FRICTION_OCP_THREADS": "1", **LINEAR_ALGEBRA}
 """Environment of a worker: the processors are shared out among the workers already."""
 PATIENCE = 5.0
 """Seconds that a worker has to end before it is killed."""
@@ -84,7 +86,7 @@ class _Team(AbstractExecutor):
 
     def _hire(self, count: int) -> None:
         context = multiprocessing.get_context("spawn")
-        with _environment(ONE_THREAD):
+        with environment(ONE_THREAD):
             for _ in range(count):
                 ours, theirs = context.Pipe()
                 process = context.Process(target=_serve, args=(theirs,), daemon=True)
@@ -150,7 +152,7 @@ class _Team(AbstractExecutor):
 
 
 @contextmanager
-def _environment(changes: dict[str, str]) -> Generator[None]:
+def environment(changes: dict[str, str]) -> Generator[None]:
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
     try:

@@ -16,7 +16,7 @@ from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import completed, quick_refit
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reexamine import exchanged
-from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import Round, choose
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Gravity
@@ -37,7 +37,7 @@ def rival(bench: Bench, key: Key) -> Rival:
     assert found is not None
     fitted = completed(quick_refit(bench.current, found))
     gains = bench.blocks.sums(held_out(bench.current)) - blocks_like(bench.current, fitted, bench.blocks)
-    return Rival(found, Standing.of(fitted), gains, lambda: fitted)
+    return Rival.of(found, fitted, gains)
 
 
 def round_of(bench: Bench, keys: list[Key]) -> Round:
