@@ -153,6 +153,7 @@ class _Team(AbstractExecutor):
 
 @contextmanager
 def environment(changes: dict[str, str]) -> Generator[None]:
+    """Set variables of the environment for a while."""
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
     try:
