@@ -177,6 +177,13 @@ def _runs(y: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     return np.concatenate(([0], changes)), np.concatenate((changes, [len(y)]))
 
 
+def plateaus(values: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return start and stop of every run of three or more samples at the highest or lowest value."""
+    starts, stops = _runs(values)
+    there = ((values == np.max(values)) | (values == np.min(values)))[starts] & (stops - starts > 2)
+    return starts[there], stops[there]
+
+
 def _moves(y: FloatArray, start: int, stop: int, reach: int) -> list[float]:
     """Return how far the signal is from the value of a run, `reach` samples before and after it."""
     places = [place for place in (start - reach, stop - 1 + reach) if 0 <= place < len(y)]

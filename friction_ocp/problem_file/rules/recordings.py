@@ -13,15 +13,11 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse, StaticUse
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
+from friction_ocp.problem_file.rules.clipping import channels_are_not_clipped
 from friction_ocp.problem_file.rules.power import contradicts
 from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.recording.checks import check_recording
-from friction_ocp.recording.conditioning import high_frequency_noise, is_clipped
-from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
-
-_STRAIGHT = 1e-9
-"""Fourth differences of straight ramps and plateaus, as a share of the range: only rounding."""
 
 
 def recordings_are_sound(case: Case) -> Iterator[Finding]:
@@ -72,38 +68,6 @@ def units_fit_signals(case: Case) -> Iterator[Finding]:
             what = f"channel '{channel.name}' is in {recorded.unit}, but {channel.measures} is in {expected}"
             allowed = f"a unit that converts to {expected}"
             yield Finding(where, what, allowed, "correct the unit in the recording, or measures")
-
-
-def channels_are_not_clipped(case: Case) -> Iterator[Finding]:
-    """A measurement does not run into the end of its range.
-
-    Set points are left out; an input of nothing but ramps and plateaus may be a command, which is only doubtful.
-    """
-    for where, channel, recorded in case.recorded():
-        if _is_command(channel) or not is_clipped(recorded.values):
-            continue
-        low, high = float(np.nanmin(recorded.values)), float(np.nanmax(recorded.values))
-        limits = f"{quantity_text(low, recorded.unit)} or {quantity_text(high, recorded.unit)}"
-        doubtful = channel.role == "input" and _is_straight(recorded)
-        yield Finding(
-            where,
-            f"channel '{channel.name}' is clipped: it stays at its extremes of {limits}",
-            remedy="record it with a wider range, or cut that part out",
-            severity="warning" if doubtful else "error",
-        )
-
-
-def _is_command(channel: Channel) -> bool:
-    return channel.part in ("reference", "temperature") or channel.signal in (
-        "enable",
-        "supply_voltage",
-        "current_command",
-    )
-
-
-def _is_straight(recorded: RecordedChannel) -> bool:
-    spread = float(np.nanmax(recorded.values) - np.nanmin(recorded.values))
-    return not high_frequency_noise(recorded.time, recorded.values) > _STRAIGHT * spread
 
 
 def inputs_move(case: Case) -> Iterator[Finding]:
