@@ -94,7 +94,7 @@ def asks_for_more(motion: Motion, time: FloatArray, effort: FloatArray) -> bool:
     if np.count_nonzero(free) < _FEW or free.all() or not np.all(np.isfinite(columns)):
         return False
     scales = np.maximum(np.linalg.norm(columns[free], axis=0), 1e-300)
-    factors: FloatArray = np.linalg.lstsq(columns[free] / scales, needed[free])[0] / scales
+    factors = np.asarray(np.linalg.lstsq(columns[free] / scales, needed[free])[0], dtype=np.float64) / scales
     errors: FloatArray = columns @ factors - needed
     spread = float(np.sqrt(np.mean(errors[free] ** 2)))
     more: FloatArray = (side * errors)[~free]
