@@ -41,8 +41,6 @@ HARDLY = (0.0005, 0.0002)
 NODE_STEPS = 8
 MOST_TURNS = 8
 STEPS_OF_NODES = 3
-AT_BOUND = 1e-9
-"""Distance from a bound over that of the bounds at which a parameter is there."""
 UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
 
@@ -68,10 +66,8 @@ class FittedModel:
     @property
     def determined(self) -> int:
         """The number of parameters that lie within their bounds, not at one."""
-        space = self.model.space
-        span = space.upper - space.lower
-        room = np.where(np.isfinite(span), AT_BOUND * span, 0.0)
-        return int(np.sum((self.theta > space.lower + room) & (self.theta < space.upper - room)))
+        low, high = self.model.space.ends(self.theta)
+        return int(np.sum(~low & ~high))
 
     @property
     def objective(self) -> float:

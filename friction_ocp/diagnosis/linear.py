@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Rows:
     """(rows,) output column; -1 for gaps, -2 for starts and priors."""
     node: IntArray
     """(rows,) grid node of the row."""
+    pressed: BoolArray
+    """(parameters,) which lie on a bound that the objective presses them against: they absorb nothing."""
     static: tuple[int, ...] = ()
     """Numbers of the sets of static points, as `recording` has them."""
 
@@ -44,7 +46,7 @@ class Rows:
     def _factors(self) -> tuple[FloatArray, FloatArray]:
         """Return (rows, rank) an orthonormal basis of what the parameters can do, and (parameters, rank) how."""
         scale = np.linalg.norm(self.jacobian, axis=0)
-        told = scale > 0
+        told = (scale > 0) & ~self.pressed
         back = np.zeros((scale.size, 0))
         if not told.any():
             return np.zeros((self.residual.size, 0)), back
@@ -248,13 +250,16 @@ def linear_program(program: Program, point: Point) -> LinearProgram:
     pull[np.arange(prior.size), prior] = 1.0 / space.prior_std[prior]
     errors = (point.theta[prior] - space.prior_mean[prior]) / space.prior_std[prior]
     none = np.full(prior.size, -1)
+    residual = np.concatenate([*(item.residual for item in items), *(seen for seen, _ in static), errors])
+    jacobian = np.concatenate([*(item.jacobian for item in items), *(slope for _, slope in static), pull])
     rows = Rows(
-        residual=np.concatenate([*(item.residual for item in items), *(seen for seen, _ in static), errors]),
-        jacobian=np.concatenate([*(item.jacobian for item in items), *(slope for _, slope in static), pull]),
+        residual=residual,
+        jacobian=jacobian,
         recording=np.concatenate([*(np.full(label[0].size, k) for k, label in enumerate(labels)), none]),
         time=np.concatenate([*(label[0] for label in labels), np.zeros(prior.size)]),
         channel=np.concatenate([*(label[1] for label in labels), np.full(prior.size, -2)]),
         node=np.concatenate([*(label[2] for label in labels), np.zeros(prior.size, int)]),
+        pressed=space.pressed(point.theta, jacobian.T @ residual),
         static=tuple(range(len(items), len(labels))),
     )
     return LinearProgram(program, point, items, rows)

@@ -26,7 +26,7 @@ from friction_ocp.effects.effect import (
     moving_shafts,
 )
 from friction_ocp.parameters import Free
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
 
 STRETCHES = 24
 """In each recording, a constant in each."""
@@ -64,7 +64,8 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
     """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
     if fitted.footing.segment_s is None:
         return ()
-    return tuple(_slow_torque(fitted, probe) for probe in probes(fitted, clues))
+    stays = _stays(fitted)
+    return tuple(_slow_torque(fitted, probe, stays) for probe in probes(fitted, clues))
 
 
 def probes(fitted: FittedModel, clues: Clues) -> Iterator[Probe]:
@@ -102,7 +103,26 @@ def _number(fitted: FittedModel, path: str, stated: object) -> float:
     return fitted.values.get(path, float(guess) if isinstance(guess, (int, float)) else 0.0)
 
 
-def _slow_torque(fitted: FittedModel, probe: Probe) -> SlowTorque:
+def _stays(fitted: FittedModel) -> IntArray:
+    """Return (rows,) the number of the stay, one value of a channel for several samples, to which a row belongs, or -1.
+
+    A counter that shows the same, because the drive stands still or is slow, errs by the same.
+    """
+    rows = fitted.linear.rows
+    found, count = np.full(rows.residual.size, -1, dtype=np.int64), 0
+    for index, item in enumerate(fitted.linear.recordings):
+        for channel in range(item.seen.shape[1]):
+            own = np.flatnonzero((rows.recording == index) & (rows.channel == channel))
+            own = own[item.seen[rows.node[own], channel]]
+            values = item.item.measured[rows.node[own], channel]
+            number = np.concatenate(([0], np.cumsum(np.diff(values) != 0.0)))[: own.size]
+            long = np.bincount(number)[number] > 1
+            found[own[long]] = count + number[long]
+            count += int(own.size)
+    return found
+
+
+def _slow_torque(fitted: FittedModel, probe: Probe, stays: IntArray) -> SlowTorque:
     built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
     theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0
@@ -118,13 +138,13 @@ def _slow_torque(fitted: FittedModel, probe: Probe) -> SlowTorque:
         whole[begin : begin + own.shape[0]] = own
         columns.append(whole)
         begin += own.shape[0]
-    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)))
+    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)), stays)
 
 
-def _tested(place: str, fitted: FittedModel, columns: FloatArray) -> SlowTorque:
-    """Test amplitudes by the share of squares that they take, each counted once (F test over all samples)."""
+def _tested(place: str, fitted: FittedModel, columns: FloatArray, stays: IntArray) -> SlowTorque:
+    """Test amplitudes against what noise makes of them: white, and for each stay one error of the same size."""
     rows = fitted.linear.rows
-    powers, axes = np.linalg.eigh(columns.T @ columns)
+    powers, axes = np.linalg.eigh(columns.T @ columns + _shared(columns, stays))
     told = powers > TOLD * max(float(powers[-1]), 1e-300)
     freedom = int(np.sum(told))
     if freedom == 0:
@@ -133,3 +153,16 @@ def _tested(place: str, fitted: FittedModel, columns: FloatArray) -> SlowTorque:
     ratio = float(np.mean(amplitudes**2))
     limit = (1.0 + FLOOR_DOUBT) ** 2
     return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / limit, freedom)))
+
+
+def _shared(columns: FloatArray, stays: IntArray) -> FloatArray:
+    """Return (columns, columns) what stays add to the covariance that white noise gives the sums over columns.
+
+    Within a stay of n samples, errors that are one error have n times the power along their sum, and none beside it;
+    the latter is left as it is for noise that is not.
+    """
+    inside = np.flatnonzero(stays >= 0)
+    _, number, lengths = np.unique(stays[inside], return_inverse=True, return_counts=True)
+    sums = np.zeros((lengths.size, columns.shape[1]))
+    np.add.at(sums, number, columns[inside])
+    return (sums * ((lengths - 1.0) / np.maximum(lengths, 1))[:, None]).T @ sums

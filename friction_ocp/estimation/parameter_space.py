@@ -17,6 +17,9 @@ from friction_ocp.expressions import parse, resolve_ties
 from friction_ocp.parameters import Free, Leaf, Tie
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
+ROUNDING = 1e-9
+"""Distance from a bound over that of the bounds at which a parameter is there."""
+
 
 @dataclass(frozen=True)
 class ParameterSpace:
@@ -76,6 +79,16 @@ class ParameterSpace:
         """Return which parameters lie on one of their bounds, (parameters,)."""
         span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, np.abs(theta) + 1.0)
         return (theta - self.lower <= 1e-6 * span) | (self.upper - theta <= 1e-6 * span)
+
+    def pressed(self, theta: FloatArray, slope: FloatArray) -> BoolArray:
+        """Return which parameters, (parameters,), a falling objective presses against a bound on which they lie."""
+        low, high = self.ends(theta)
+        return (low & (slope > 0)) | (high & (slope < 0))
+
+    def ends(self, theta: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """Return which parameters are at their lower and which at their upper bound but for rounding."""
+        span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, 0.0)
+        return theta - self.lower <= ROUNDING * span, self.upper - theta <= ROUNDING * span
 
     def moved(self, start: FloatArray) -> ParameterSpace:
         """Return the space with another start; priors and bounds stay."""
