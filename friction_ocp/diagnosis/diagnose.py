@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.reading import explains_more, other_reading
 from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Round, choose, shown, with_refused
+from friction_ocp.diagnosis.select import Round, choose, shown, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.worth import (
@@ -192,6 +192,8 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             if not innovations(current).significant(level):
                 bench, rounds, accepted = _settled(bench, run, tell, rounds, accepted, level, rng)
                 break
+    if accepted and not _explains_most(base, bench.current, level):
+        bench, rounds, accepted = bench.at(base), [withdrawn(rounds[0])], []
     current, checked = _checked(bench.current, names, level)
     rounds, clues, left = [*rounds, *checked], clues_of(current), innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
@@ -209,6 +211,15 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         blind=blind_spots(current, left, clues, names),
         seconds=time.perf_counter() - began,
     )
+
+
+def _explains_most(base: FittedModel, current: FittedModel, level: float) -> bool:
+    """Whether what was added leaves nothing, or explains more of the errors of one-step predictions than it leaves.
+
+    Else what is not known is the larger part, and what was added may be no more than its shadow.
+    """
+    left = innovations(current)
+    return not left.significant(level) or left.beyond < 0.5 * innovations(base).beyond
 
 
 def _crew(bench: Bench, run: Execution, number: int, tell: Tell) -> Crew:

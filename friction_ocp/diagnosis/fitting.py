@@ -41,6 +41,8 @@ HARDLY = (0.0005, 0.0002)
 NODE_STEPS = 8
 MOST_TURNS = 8
 STEPS_OF_NODES = 3
+MOST_OF = 0.5
+"""Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
 UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
 
@@ -205,7 +207,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     """Fit a candidate, a few steps from each of the starts that the score test predicts.
 
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
-    Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were.
+    Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
+    where most of that stays, steps begin at a large effect, too.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -217,6 +220,12 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
         far = [_steps(base, model, program, eased(program, point, factor)) for point in away]
         ends += [timed(end, QUICK) for end in far]
+    large, best = item.augmentation.large, min(end.objective for end in ends)
+    if large is not None and FAR < factor < np.inf and base.objective - best < MOST_OF * base.objective:
+        tried = [large(start.added(item.augmentation.off)) for start in item.starts]
+        ends += [
+            _steps(base, model, program, _point(base, model, built, {**base.values, **values})) for values in tried
+        ]
     return min(ends, key=lambda fitted: fitted.objective)
 
 

@@ -31,12 +31,16 @@ class Standing:
     """Fitted values by name."""
     material: bool = True
     """Whether it takes away more than the floors are in doubt by; only a refit that is to be added is asked."""
+    prior: float = 0.0
+    """What the distance of fitted values from stated ones costs."""
 
     @classmethod
     def of(cls, fitted: FittedModel, material: bool = True) -> Standing:
         """Look at a fit."""
         size = float(np.linalg.norm(_errors(fitted)))
-        return cls(fitted.cost, fitted.objective, size, fitted.determined, fitted.values, material)
+        own = fitted.linear.rows
+        prior = 0.5 * float(np.sum(own.residual[own.recording < 0] ** 2))
+        return cls(fitted.cost, fitted.objective, size, fitted.determined, fitted.values, material, prior)
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,11 @@ class Screened:
         """Effect and component."""
         return self.effect, self.component
 
+    def holds(self, other: Screened) -> bool:
+        """Whether this has all added parameters of another candidate, and more."""
+        own, others = set(self.augmentation.off), set(other.augmentation.off)
+        return bool(others) and others < own
+
 
 def screen(
     model: Model, base: LinearProgram, blocks: Blocks, effect: AbstractEffect, place: str, clues: Clues

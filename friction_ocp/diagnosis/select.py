@@ -40,6 +40,10 @@ class Choice:
     """The best rival and all that leave the same residuals."""
 
 
+NOTHING = Choice((), (), 1.0, False, ())
+"""No rival takes part."""
+
+
 @dataclass(frozen=True)
 class Round:
     """One decision: which addition, if any."""
@@ -76,11 +80,11 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
 
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
-    parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`); rivals that leave the
-    same residuals share what they have.
+    parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), and its distance from
+    stated values what their priors say; rivals that leave the same residuals share what they have.
     """
     if not rivals:
-        return Choice((), (), 1.0, False, ())
+        return NOTHING
     draws = resamples(blocks, rng)
     totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in rivals)])
     shares = _weights(totals).mean(axis=0)
@@ -109,6 +113,11 @@ def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:
     )
 
 
+def withdrawn(item: Round) -> Round:
+    """Return a round with its addition taken back: its rivals explain too little to take part."""
+    return replace(item, choice=with_refused(NOTHING, item.choice.rivals), accepted=None)
+
+
 def price(blocks: Blocks, parts: int) -> float:
     """Return what a parameter costs beside the likelihood of what was held out.
 
@@ -131,8 +140,8 @@ def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[fl
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    weights = np.array([np.exp(-each * rival.standing.determined - float(_blames_sensor(rival))) for rival in rivals])
-    weights = weights / weights.max()
+    prices = [each * item.standing.determined + item.standing.prior + float(_blames_sensor(item)) for item in rivals]
+    weights = np.exp(min(prices) - np.array(prices))
     shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
     found = list[float]()
     for k in range(len(rivals)):
@@ -150,13 +159,15 @@ def shown(aliases: Sequence[Rival]) -> tuple[Rival, ...]:
     """Return the members of an alias set that are worth naming.
 
     Of those that leave the same residuals as the best, only the one that says something else: another effect, and at
-    another component where there is one. The others are no further explanations but the same one in other words.
+    another component where there is one. The others are no further explanations but the same one in other words. Nor is
+    one that has all that another has, and more.
     """
     if not aliases:
         return ()
     best = aliases[0]
-    same = [rival for rival in aliases[1:] if is_same(rival, best)]
-    others = [rival for rival in aliases[1:] if rival not in same]
+    plain = [rival for rival in aliases[1:] if not any(rival.screened.holds(other.screened) for other in aliases)]
+    same = [rival for rival in plain if is_same(rival, best)]
+    others = [rival for rival in plain if rival not in same]
     different = sorted(
         same, key=lambda rival: (rival.key[0] == best.key[0], _blames_sensor(rival), rival.key[1] == best.key[1])
     )

@@ -26,7 +26,7 @@ from friction_ocp.effects.effect import (
     moving_shafts,
 )
 from friction_ocp.parameters import Free
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 STRETCHES = 24
 """In each recording, a constant in each."""
@@ -65,7 +65,7 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
     if fitted.footing.segment_s is None:
         return ()
     stays = _stays(fitted)
-    return tuple(_slow_torque(fitted, probe, stays) for probe in probes(fitted, clues))
+    return tuple(slow_torque_of(fitted, probe, stays) for probe in probes(fitted, clues))
 
 
 def probes(fitted: FittedModel, clues: Clues) -> Iterator[Probe]:
@@ -106,7 +106,7 @@ def _number(fitted: FittedModel, path: str, stated: object) -> float:
 def _stays(fitted: FittedModel) -> IntArray:
     """Return (rows,) the number of the stay, one value of a channel for several samples, to which a row belongs, or -1.
 
-    A counter that shows the same, because the drive stands still or is slow, errs by the same.
+    A counter that shows the same while the drive stands still or turns back errs by the same.
     """
     rows = fitted.linear.rows
     found, count = np.full(rows.residual.size, -1, dtype=np.int64), 0
@@ -116,13 +116,32 @@ def _stays(fitted: FittedModel) -> IntArray:
             own = own[item.seen[rows.node[own], channel]]
             values = item.item.measured[rows.node[own], channel]
             number = np.concatenate(([0], np.cumsum(np.diff(values) != 0.0)))[: own.size]
-            long = np.bincount(number)[number] > 1
+            long = _is_stay(values)[number]
             found[own[long]] = count + number[long]
             count += int(own.size)
     return found
 
 
-def _slow_torque(fitted: FittedModel, probe: Probe, stays: IntArray) -> SlowTorque:
+def _is_stay(values: FloatArray) -> BoolArray:
+    """Return (runs of equal values,) which are not just passed through.
+
+    A count that a drive passes at a steady speed errs by as much on the way in as on the way out, which adds up to
+    nothing. Where it turns back, or dwells for longer than at the counts beside, that is not so.
+    """
+    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
+    lengths = np.diff(np.concatenate(([0], edges, [values.size])))
+    if lengths.size < 3:
+        return lengths > 1
+    level = values[np.concatenate(([0], edges))]
+    passed = np.zeros(lengths.size, dtype=bool)
+    passed[1:-1] = (level[1:-1] - level[:-2]) * (level[2:] - level[1:-1]) > 0
+    beside = np.zeros(lengths.size)
+    beside[1:-1] = np.maximum(lengths[:-2], lengths[2:])
+    return (lengths > 1) & ~(passed & (lengths <= 2 * beside))
+
+
+def slow_torque_of(fitted: FittedModel, probe: Probe, stays: IntArray) -> SlowTorque:
+    """Test one place; `stays` (rows,) numbers the samples that share an error of rounding, -1 for those that do not."""
     built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
     theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0

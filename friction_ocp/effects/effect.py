@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -200,6 +200,8 @@ class Augmentation:
     off: Mapping[str, float]
     """Values of the added parameters at which the drive is the one it was."""
     trials: tuple[Trial, ...]
+    large: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
+    """Gives values at which a large effect may begin, from those of a small one; None where size is all that grows."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -58,6 +58,10 @@ class ConstantTorqueEffect(AbstractEffect):
 
 BLUNT = 0.1
 """Damping over inertia and angular frequency of modes on a coarse grid."""
+MOST_HUNG = 0.7
+"""Share of the inertia that hangs on the spring where most of it does: the resonance is then twice the zero."""
+LIGHTEST = 0.01
+"""Inertia that stays rigid over the one that is stated, at least."""
 
 
 def mode_of(shaft: str) -> str:
@@ -66,7 +70,7 @@ def mode_of(shaft: str) -> str:
 
 
 class StructuralModeEffect(AbstractEffect):
-    """A further inertia on a spring."""
+    """A further inertia on a spring, or some of that which is stated."""
 
     name: ClassVar[str] = "structural_mode"
     sentence: ClassVar[str] = "a further inertia hangs on the shaft by a spring"
@@ -93,11 +97,30 @@ class StructuralModeEffect(AbstractEffect):
             damping=Free(0.1 * inertia * rates[6], 0.0, 10.0 * inertia * rates[-1]),
         )
         body = Shaft(mode, Free(inertia, 1e-3 * inertia, 1e2 * inertia), motion=shaft.motion)
-        added = replace(drive, shafts=(*drive.shafts, body), transmissions=(*drive.transmissions, joint))
+        host, off = _lightened(shaft), {f"{mode}.inertia": 0.0}
+        if host is not shaft:
+            off[f"{place}.inertia"] = float(shaft.inertia)
+        grown = change_shaft(drive, place, inertia=host.inertia)
+        added = replace(grown, shafts=(*grown.shafts, body), transmissions=(*drive.transmissions, joint))
         tried = [(rate, BLUNT) for rate in rates]
         tried += [(rate, SHARP) for rate in clues.ringing(place, rates[0], rates[-1])]
         trials = tuple(
             Trial(({f"{mode}.inertia": inertia, stiffness: inertia * rate**2, damping: ratio * inertia * rate},))
             for rate, ratio in tried
         )
-        return Augmentation(added, {f"{mode}.inertia": 0.0}, trials)
+        joint_paths = (stiffness, damping)
+
+        def large(small: Mapping[str, float]) -> Mapping[str, float]:
+            whole = clues.numbers[f"{place}.inertia"]
+            grown = MOST_HUNG * whole / max(small[f"{mode}.inertia"], 1e-300)
+            hung = {f"{mode}.inertia": MOST_HUNG * whole, **{path: grown * small[path] for path in joint_paths}}
+            return {**small, **hung, f"{place}.inertia": (1.0 - MOST_HUNG) * whole}
+
+        return Augmentation(added, off, trials, large)
+
+
+def _lightened(shaft: Shaft) -> Shaft:
+    """Return the shaft with an inertia that may be less than stated: the statement may count what hangs on a spring."""
+    if not isinstance(shaft.inertia, (int, float)) or not shaft.inertia > 0:
+        return shaft
+    return replace(shaft, inertia=Free(shaft.inertia, LIGHTEST * shaft.inertia, shaft.inertia))

@@ -49,7 +49,7 @@ def round_sentence(item: Json) -> str:
     none, outside = (whole_percent(chances[key]) for key in ("no_effect", "outside_catalogue"))
     accepted = part(item, "accepted")
     tried = any(cause.get("refit_gain") is not None for cause in rows(item, "causes"))
-    why = ": no candidate is certain to help on recordings left out" if tried else ""
+    why = ": no candidate is certain to help on recordings left out, and explains enough" if tried else ""
     added = "Given a more general shape" if item.get("reshaped") else "Added"
     decided, when = (
         (f"{added}: {_named(accepted)}.", "Before it") if accepted else (f"Nothing was added{why}.", "So far")

@@ -11,6 +11,10 @@ import numpy as np
 Keys = tuple[str | int, ...]
 
 
+MOST_OFF = 2.5
+"""Deviations of its spread by which a guess is off, at most."""
+
+
 @dataclass(frozen=True)
 class Number:
     """A number of the machine.
@@ -65,12 +69,16 @@ def truth(document: Any) -> Any:
 
 
 def handbook(document: Any, rng: np.random.Generator) -> Any:
-    """Return the document as the handbook has it: what is known, and guesses that are off."""
+    """Return the document as the handbook has it: what is known, and guesses that are off.
+
+    No further than MOST_OFF: what lies beyond three deviations of its prior is wrong, which is an effect of its own.
+    """
 
     def entry(number: Number) -> Any:
         if number.spread == 0.0:
             return float(f"{number.true:.9g}")
-        guess = float(f"{number.true * np.exp(number.spread * rng.standard_normal()):.4g}")
+        off = np.clip(rng.standard_normal(), -MOST_OFF, MOST_OFF)
+        guess = float(f"{number.true * np.exp(number.spread * off):.4g}")
         bounds = {"guess": guess, "min": 0.02 * guess, "max": 50.0 * guess}
         return bounds | ({"prior_std": float(f"{number.spread * guess:.3g}")} if number.stated else {})
 

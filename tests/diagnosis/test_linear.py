@@ -84,6 +84,24 @@ def test_recordings_are_held_out_of_fits_at_bounds(tmp_path: Path) -> None:
     assert fitted.objective <= costs * (1.0 + 1e-6) < 1.5 * fitted.objective
 
 
+def test_a_parameter_pressed_against_a_bound_absorbs_nothing(tmp_path: Path) -> None:
+    """Viscous friction on a second shaft, rigidly joined, shows what a bound on that of the first keeps from it."""
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    viscous = document["drive"]["shafts"][0]["friction"]["viscous"]
+    slopes = list[float]()
+    for lower in (0.0, 2.0 * VISCOUS):
+        viscous |= {"guess": 3.0 * VISCOUS, "min": lower}
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        fitted = fit_base(prepare(load_problem(path)))
+        rows = fitted.linear.rows
+        column = rows.jacobian[:, [fitted.model.space.names.index("motor.friction.viscous")]]
+        slopes.append(float(np.linalg.norm(rows.absorbed(column)) / np.linalg.norm(column)))
+        assert rows.pressed.any() == (lower > 0)
+    assert slopes[0] < 1e-6
+    assert slopes[1] > 0.1
+
+
 def test_a_gap_in_a_few_blocks_counts(fitted: FittedModel) -> None:
     """One block in which residuals are fifty times the noise is a gap, however unequal that makes the blocks."""
     rows = fitted.linear.rows

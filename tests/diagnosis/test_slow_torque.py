@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
 
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import fit_base
-from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, slow_torques
+from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, slow_torque_of, slow_torques
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -33,6 +34,19 @@ def test_noise_is_no_slow_torque(seed: int, tmp_path: Path) -> None:
     one = found(write_case(tmp_path, axis(), seed))
     assert one.p_value > 0.01
     assert one.ratio == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / (2 * STRETCHES)))
+
+
+def test_coarse_counts_are_no_slow_error(tmp_path: Path) -> None:
+    """An encoder of six counts a turn, which stays at one whenever the drive is slow, errs by rounding."""
+    plain = axis()
+    coarse = replace(plain.sensors[0], resolution=2.0 * np.pi / 6)
+    path = write_case(tmp_path, replace(plain, sensors=(coarse, *plain.sensors[1:])))
+    fitted = fit_base(prepare(load_problem(path)))
+    clues = clues_of(fitted)
+    assert all(item.p_value > 0.01 for item in slow_torques(fitted, clues))
+    probe = next(item for item in probes(fitted, clues) if item.component == "position")
+    white = slow_torque_of(fitted, probe, np.full(fitted.linear.rows.residual.size, -1))
+    assert white.p_value < 1e-6, "the stays are what makes the difference"
 
 
 def test_gusts_are_seen(tmp_path: Path) -> None:
