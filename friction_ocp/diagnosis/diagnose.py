@@ -252,14 +252,16 @@ def _settled(
 
 
 def _checked(current: FittedModel, names: Sequence[str], level: float) -> tuple[FittedModel, list[Round]]:
-    """Take back stated values that the model, once it leaves nothing but noise, contradicts.
+    """Take back stated values that the model, once it leaves no more than noise, contradicts.
 
-    Before that they may be far off because they stand in for what is missing.
+    Before that they may be far off because they stand in for what is missing: be it what a law of slightly another
+    shape leaves, which is too little to be a gap and yet much more than what a value far from its statement costs.
     """
     rounds = list[Round]()
     for _ in range(MOST_ROUNDS):
         power = innovations(current)
-        found = [] if power.significant(level) else contradictions(current)
+        noise = not power.significant(level) and power.ratio <= (1.0 + FLOOR_DOUBT) ** 2
+        found = contradictions(current) if noise else []
         if not found:
             break
         fitted, choice = corrected(current, found, names)

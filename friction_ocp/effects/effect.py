@@ -90,8 +90,9 @@ class Clues:
     ) -> list[float]:
         """Return the likeliest periods of the missing torque of a shaft over its angle ("theta") or "time".
 
-        `against_motion` looks for a wave times the sign of the speed, `against_torque` times a motor's torque. Without
-        a missing torque, harmonics of a turn, or parts of the longest recording.
+        They are seen twice at least, or come back with every turn: what is longer is a trend. `against_motion` looks
+        for a wave times the sign of the speed, `against_torque` times a motor's torque. Without a missing torque,
+        harmonics of a turn, or parts of the longest recording.
         """
         asked = (shaft, over, against_motion, against_torque)
         if asked not in self._known_periods:
@@ -102,6 +103,10 @@ class Clues:
         place = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
         travel = max(float(np.ptp(one)) for one in place)
         frequencies = self._frequencies(place, travel)
+        lowest = 2.0 / max(travel, 1e-300)
+        if over == "theta":
+            lowest = min(lowest, 1.0 / (2.0 * np.pi))
+        frequencies = frequencies[frequencies >= lowest]
         power = np.zeros(frequencies.size)
         for track, one in zip(self.tracks, place, strict=True):
             at = track.finely.middle

@@ -1,0 +1,55 @@
+"""How rivals are weighed: what tells two of the same residuals apart, and which of them are named."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from friction_ocp.diagnosis.blocks import Blocks
+from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.diagnosis.select import Choice, choose, shown
+from friction_ocp.effects.effect import Augmentation
+
+COUNT = 60
+BLOCKS = Blocks(np.arange(COUNT), np.repeat(np.arange(3), COUNT // 3))
+RESIDUAL = np.random.default_rng(5).standard_normal(600)
+DRIVE: Any = None
+"""No rival of these tests is simulated."""
+
+
+def rival(effect: str, component: str, off: dict[str, float], prior: float = 0.0, gain: float = 5.0) -> Rival:
+    """Return a rival that gains the same in every block and leaves the residuals that all of them leave."""
+    rows = SimpleNamespace(residual=RESIDUAL, channel=np.zeros(RESIDUAL.size))
+    fitted = cast(Any, SimpleNamespace(linear=SimpleNamespace(rows=rows)))
+    size = float(np.linalg.norm(RESIDUAL))
+    standing = Standing(cost=1.0, objective=1.0, size=size, determined=3, values={}, prior=prior)
+    screened = Screened(effect, component, 1.0, 0.0, (), Augmentation(DRIVE, off, ()))
+    return Rival(screened, standing, np.full(COUNT, gain), lambda: fitted)
+
+
+def chosen(*rivals: Rival) -> Choice:
+    return choose(list(rivals), BLOCKS, 3, 0.01, np.random.default_rng(0))
+
+
+def test_stated_values_tell_equal_explanations_apart() -> None:
+    """Of a heavier rotor and a stronger motor, the one that leaves other stated values where they are is right."""
+    light = rival("inertia_error", "motor", {"motor.inertia": 1.0})
+    strong = rival("parameter_error", "drive", {"drive.torque_constant": 1.0}, prior=9.0)
+    choice = chosen(strong, light)
+    assert choice.rivals[0] is light
+    odds = choice.probabilities[0] / choice.probabilities[1]
+    assert odds == pytest.approx(np.exp(9.0))
+    assert choice.aliases == (light,)
+
+
+def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
+    """An eccentric disc with a free zero says nothing that the zero alone does not; the other encoder's zero does."""
+    here = rival("sensor_offset", "motor_position", {"motor_position.offset": 0.0})
+    there = rival("sensor_offset", "load_position", {"load_position.offset": 0.0})
+    disc = rival("sensor_eccentricity", "load_position", {"load_position.offset": 0.0, "load_position.wave": 0.0})
+    assert shown((here, disc, there)) == (here, there)
+    assert shown((disc, here)) == (disc, here)
