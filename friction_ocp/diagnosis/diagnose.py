@@ -32,6 +32,7 @@ from friction_ocp.diagnosis.worth import (
     required,
     shapes,
     shortlist,
+    with_resembling,
 )
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -309,7 +310,7 @@ def _round(
     power = excess(current.linear.rows, blocks)
     hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
     gap = power.significant(level)
-    chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
+    chosen = with_resembling(shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found)
     parts = len(folds(current))
     choice = choose([], blocks, parts, level, rng)
     for rivals in _completed(crew, chosen):

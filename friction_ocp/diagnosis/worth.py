@@ -66,6 +66,13 @@ def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
     return [item for item in found if item.effect in named and item.gain >= worth][:REFITTED]
 
 
+def with_resembling(chosen: Sequence[Screened], found: Sequence[Screened]) -> list[Screened]:
+    """Return candidates with those that resemble them, whatever these promise, as far as their starts go."""
+    catalogue, keys = effects(), {item.key for item in chosen}
+    alike = {name for item in chosen for name in catalogue[item.effect].resembles}
+    return [*chosen, *(item for item in found if item.effect in alike and item.key not in keys and item.starts)]
+
+
 def required(base: FittedModel, current: FittedModel) -> float:
     """Return the decrease of the objective that makes an addition an effect of its own."""
     whole, rest = (max(item.cost - 0.5 * samples(item), 0.0) for item in (base, current))

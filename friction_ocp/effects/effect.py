@@ -234,6 +234,8 @@ class AbstractEffect(ABC):
     name: ClassVar[str]
     sentence: ClassVar[str]
     """What it means, for the reader."""
+    resembles: ClassVar[tuple[str, ...]] = ()
+    """Effects of which one may look like this one, and of which the prediction for a large one says little."""
 
     @abstractmethod
     def places(self, drive: Drive) -> Iterable[str]:

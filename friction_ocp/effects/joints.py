@@ -46,6 +46,7 @@ class ComplianceEffect(AbstractEffect):
 
     name: ClassVar[str] = "compliance"
     sentence: ClassVar[str] = "elastic where the model says rigid"
+    resembles: ClassVar[tuple[str, ...]] = ("structural_mode",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in drive.transmissions if item.rigid]

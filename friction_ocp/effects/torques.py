@@ -74,6 +74,7 @@ class StructuralModeEffect(AbstractEffect):
 
     name: ClassVar[str] = "structural_mode"
     sentence: ClassVar[str] = "a further inertia hangs on the shaft by a spring"
+    resembles: ClassVar[tuple[str, ...]] = ("compliance",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         taken = {shaft.name for shaft in drive.shafts}
