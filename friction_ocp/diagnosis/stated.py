@@ -17,6 +17,7 @@ from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.effects.effect import Augmentation
 from friction_ocp.effects.registry import candidates
@@ -61,15 +62,43 @@ def contradictions(fitted: FittedModel) -> list[Contradiction]:
 def _distance(fitted: FittedModel) -> FloatArray:
     """Return (parameters,) prior deviations between fitted and stated values.
 
-    What is stated as the inertia of a shaft may count what hangs on it by a spring, or not.
+    What is stated as the inertia of a shaft may count what hangs by a spring on it, or on a shaft rigidly joined to it,
+    or not.
     """
     space, values = fitted.model.space, fitted.values
     distance: FloatArray = np.abs(fitted.theta - space.prior_mean) / space.prior_std
     for k, name in enumerate(space.names):
-        shaft, _, quantity = name.rpartition(".")
-        hung = values.get(f"{mode_of(shaft)}.{quantity}", 0.0)
+        hung = _hung(fitted, name)
         distance[k] = min(distance[k], abs(values[name] + hung - space.prior_mean[k]) / space.prior_std[k])
     return distance
+
+
+def _hung(fitted: FittedModel, name: str) -> float:
+    """Return the inertia that hangs by springs on a shaft or on those rigidly joined to it; 0 for other parameters.
+
+    What the others have hung of their own, stated inertia is not counted.
+    """
+    values, model = fitted.values, fitted.model
+    shaft, _, quantity = name.rpartition(".")
+    modes = {item.name: values.get(f"{mode_of(item.name)}.inertia") for item in model.problem.drive.shafts}
+    if quantity != "inertia" or shaft not in modes or not any(modes.values()):
+        return 0.0
+    numbers, _ = model.space.numbers_and_slope(fitted.theta, model.train[0].name)
+    joints = topology(bind_drive(model.problem.drive, dict(zip(model.space.leaf_names, numbers, strict=True))))
+    alike = [other for other in joints.members(joints.group_of[shaft]) if modes.get(other)]
+    ratios = [float(joints.speed_ratio[other] / joints.speed_ratio[shaft]) for other in alike]
+    hung = [(modes[other] or 0.0) - (0.0 if other == shaft else _lightened(fitted, other)) for other in alike]
+    return sum(part * ratio**2 for part, ratio in zip(hung, ratios, strict=True))
+
+
+def _lightened(fitted: FittedModel, shaft: str) -> float:
+    """Return by how much a shaft is lighter than it was stated to be before it got a mode."""
+    space, name = fitted.model.space, f"{shaft}.inertia"
+    if name not in space.names:
+        return 0.0
+    k = space.names.index(name)
+    stated = space.prior_mean[k] if np.isfinite(space.prior_std[k]) else space.upper[k]
+    return float(stated - fitted.theta[k])
 
 
 def _key(path: str, drive: Drive) -> tuple[str, str]:
