@@ -88,7 +88,7 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     draws = resamples(blocks, rng)
     totals = np.column_stack([np.zeros(len(draws)), *(draws @ rival.gains for rival in rivals)])
     shares = _weights(totals).mean(axis=0)
-    chances = _shared(rivals, shares[1:], price(blocks, parts))
+    chances = _shared(rivals, totals[:, 1:], float(np.sum(shares[1:])), price(blocks, parts))
     order = sorted(range(len(rivals)), key=lambda k: -chances[k])
     ordered = [rivals[k] for k in order]
     best = totals[:, order[0] + 1]
@@ -135,18 +135,23 @@ def schwarz(blocks: Blocks) -> float:
     return 0.5 * float(np.log(max(blocks.count, 1)))
 
 
-def _shared(rivals: Sequence[Rival], shares: FloatArray, each: float) -> list[float]:
-    """Return probabilities in which those of the same residuals divide what they have together."""
+def _shared(rivals: Sequence[Rival], totals: FloatArray, whole: float, each: float) -> list[float]:
+    """Return probabilities that add up to `whole`; those of the same residuals divide what they have together.
+
+    `totals` (draws, rivals) are held-out gains, `each` is the price of a parameter.
+    """
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    prices = [each * item.standing.determined + item.standing.prior + float(_blames_sensor(item)) for item in rivals]
-    weights = np.exp(min(prices) - np.array(prices))
-    shares = shares * weights * float(np.sum(shares)) / max(float(np.sum(shares * weights)), 1e-300)
+    prices = np.array(
+        [each * item.standing.determined + item.standing.prior + float(_blames_sensor(item)) for item in rivals]
+    )
+    shares = whole * _weights(totals - prices).mean(axis=0)
     found = list[float]()
     for k in range(len(rivals)):
         own = [j for j in range(len(rivals)) if owner[j] == owner[k]]
-        found.append(float(sum(shares[own]) * weights[k] / sum(weights[own])))
+        part = _weights(-prices[None, own])[0][own.index(k)]
+        found.append(float(np.sum(shares[own]) * part))
     return found
 
 

@@ -109,12 +109,18 @@ class Standard:
 
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
-        so much of what they have beyond noise goes as makes an effect of its own.
+        so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and get
+        worse, contradict them: what helps from sample to sample alone is not what moves the machine.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
         one_step = (self._beyond, innovations(fitted).beyond)
-        if one_step[1] <= (1.0 - OF_REST) * one_step[0] or (before.lost and after.excess() <= before.excess()):
+        most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
+        if before.lost:
+            told = most or after.excess() <= before.excess()
+        else:
+            told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()
+        if told:
             pairs.append(one_step)
         return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
 

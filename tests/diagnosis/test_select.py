@@ -22,10 +22,11 @@ DRIVE: Any = None
 
 
 def rival(effect: str, component: str, off: dict[str, float], prior: float = 0.0, gain: float = 5.0) -> Rival:
-    """Return a rival that gains the same in every block and leaves the residuals that all of them leave."""
-    rows = SimpleNamespace(residual=RESIDUAL, channel=np.zeros(RESIDUAL.size))
+    """Return a rival that gains the same in every block; those that gain the same leave the same residuals."""
+    left = RESIDUAL / gain
+    rows = SimpleNamespace(residual=left, channel=np.zeros(left.size))
     fitted = cast(Any, SimpleNamespace(linear=SimpleNamespace(rows=rows)))
-    size = float(np.linalg.norm(RESIDUAL))
+    size = float(np.linalg.norm(left))
     standing = Standing(cost=1.0, objective=1.0, size=size, determined=3, values={}, prior=prior)
     screened = Screened(effect, component, 1.0, 0.0, (), Augmentation(DRIVE, off, ()))
     return Rival(screened, standing, np.full(COUNT, gain), lambda: fitted)
@@ -44,6 +45,15 @@ def test_stated_values_tell_equal_explanations_apart() -> None:
     odds = choice.probabilities[0] / choice.probabilities[1]
     assert odds == pytest.approx(np.exp(9.0))
     assert choice.aliases == (light,)
+
+
+def test_a_gain_outweighs_what_stated_values_cost() -> None:
+    """However far stated values have to give way, what explains more than that costs is the likelier cause."""
+    strange = rival("presliding", "motor", {"sigma0": 0.0}, prior=900.0, gain=50.0)
+    usual = rival("stribeck", "motor", {"tau_s": 0.0}, prior=0.0, gain=5.0)
+    choice = chosen(usual, strange)
+    assert choice.rivals[0] is strange
+    assert sum(choice.probabilities) + choice.nothing == pytest.approx(1.0)
 
 
 def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
