@@ -109,8 +109,8 @@ class Standard:
 
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
-        so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and get
-        worse, contradict them: what helps from sample to sample alone is not what moves the machine.
+        so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
+        get worse, contradict them: what helps from sample to sample alone is not what moves the machine.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
