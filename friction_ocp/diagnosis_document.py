@@ -11,10 +11,11 @@ import numpy as np
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round, considered
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
+from friction_ocp.diagnosis.options import AT, considered
 from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import probabilities
@@ -277,7 +278,9 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"{shaft}: {noise}, from the measured inputs and what the file states")
     lines += [] if diagnosis.stated is None else corrections(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
-    left_out = [name for name in effects() if name not in considered(diagnosis.problem)]
-    lines.append(f"the catalogue: {', '.join(name for name in effects() if name not in left_out)}")
+    meant = considered(diagnosis.problem)
+    left_out = [name for name in effects() if name not in meant.names]
+    lines.append(f"the catalogue: {', '.join(meant.entries)}")
+    left_out += [AT.join(key) for key in sorted(meant.excluded)]
     lines += [f"left out of the catalogue by the file: {', '.join(left_out)}"] if left_out else []
     return lines

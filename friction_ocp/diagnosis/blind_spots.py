@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.worth import places
+from friction_ocp.diagnosis.options import Considered, places
 from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import effects
 from friction_ocp.simulation.grid import FloatArray
@@ -34,10 +34,10 @@ class BlindSpot:
     """The usual size, N m or N."""
 
 
-def blind_spots(fitted: FittedModel, left: Excess, clues: Clues, names: Sequence[str]) -> tuple[BlindSpot, ...]:
-    """Return where effects of these names that a model lacks would hide; what is `left` counts as noise."""
+def blind_spots(fitted: FittedModel, left: Excess, clues: Clues, meant: Considered) -> tuple[BlindSpot, ...]:
+    """Return where effects that compete and that a model lacks would hide; what is `left` counts as noise."""
     enough = CERTAIN * max(left.ratio, 1.0) ** 0.5
-    found = (_blind_spot(fitted, enough, clues, *key) for key in places(fitted, list(names)))
+    found = (_blind_spot(fitted, enough, clues, *key) for key in places(fitted, meant))
     return tuple(item for item in found if item is not None)
 
 

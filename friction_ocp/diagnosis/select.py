@@ -118,6 +118,14 @@ def withdrawn(item: Round) -> Round:
     return replace(item, choice=with_refused(NOTHING, item.choice.rivals), accepted=None)
 
 
+def put_first(item: Round, rival: Rival) -> Round:
+    """Return a round that has accepted another rival of its alias set."""
+    choice = item.choice
+    aliases = (rival, *(other for other in choice.aliases if other is not rival))
+    same = (rival, *(other for other in choice.rivals if other is not rival and is_same(other, rival)))
+    return replace(item, choice=replace(choice, aliases=aliases, same=same), accepted=rival)
+
+
 def price(blocks: Blocks, parts: int) -> float:
     """Return what a parameter costs beside the likelihood of what was held out.
 

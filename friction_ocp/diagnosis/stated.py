@@ -12,6 +12,7 @@ from friction_ocp.diagnosis.blocks import Blocks, blocks_of, stats
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, freed, polished, quick_refit
 from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.options import Considered
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz
@@ -109,7 +110,7 @@ def _key(path: str, drive: Drive) -> tuple[str, str]:
     return ("inertia_error" if rest == "inertia" else "parameter_error"), part
 
 
-def corrected(current: FittedModel, found: Sequence[Contradiction], names: Sequence[str]) -> tuple[FittedModel, Choice]:
+def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Considered) -> tuple[FittedModel, Choice]:
     """Fit again with the stated values of one part taken back, the one that leaves least; return fit and choice.
 
     It is a part whose fitted values are far from what is stated for them, or one whose values are fixed: fitted ones
@@ -118,7 +119,7 @@ def corrected(current: FittedModel, found: Sequence[Contradiction], names: Seque
     blocks = blocks_of(current.linear.rows)
     each, without = schwarz(blocks), blocks.sums(held_out(current))
     best = dict[Key, tuple[float, Rival]]()
-    for count, seen, fitted in [*_released(current, found), *_freed(current, blocks, found, names)]:
+    for count, seen, fitted in [*_released(current, found), *_freed(current, blocks, found, meant)]:
         gains = without - blocks_like(current, fitted, blocks)
         score = fitted.cost + count * each
         if seen.key not in best or score < best[seen.key][0]:
@@ -142,7 +143,7 @@ def _released(current: FittedModel, found: Sequence[Contradiction]) -> Iterator[
 
 
 def _freed(
-    current: FittedModel, blocks: Blocks, found: Sequence[Contradiction], names: Sequence[str]
+    current: FittedModel, blocks: Blocks, found: Sequence[Contradiction], meant: Considered
 ) -> Iterator[tuple[int, Screened, FittedModel]]:
     """Yield fits with the fixed values of a part made free, part by part.
 
@@ -152,7 +153,9 @@ def _freed(
     clues, model = clues_of(current), current.model
     stated = dict(zip(model.space.names, map(float, model.space.prior_mean), strict=True))
     wanted = current.values | {name: stated[name] for item in found for name in item.names}
-    for effect, place in candidates(model.problem.drive, [name for name in names if name in STATED]):
+    for effect, place in candidates(model.problem.drive, [name for name in meant.names if name in STATED]):
+        if not meant.holds(effect.name, place):
+            continue
         seen = screen(model, current.linear, blocks, effect, place, clues)
         if seen is None or not seen.starts:
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.effects.effect import Clues
-from friction_ocp.effects.registry import candidates, effects
+from friction_ocp.effects.registry import effects
 
 REFITTED = 6
 """Candidates that are refitted in a round."""
@@ -36,18 +36,6 @@ def shapes(current: FittedModel, clues: Clues, accepted: Sequence[Key]) -> list[
     """Return the accepted effects that may have a more general shape than they have."""
     drive, catalogue = current.model.problem.drive, effects()
     return [key for key in dict.fromkeys(accepted) if catalogue[key[0]].reshaped(drive, key[1], clues) is not None]
-
-
-def places(current: FittedModel, names: list[str]) -> list[Key]:
-    """Return effects and places; static points also show friction of shafts whose motion an input prescribes."""
-    drive = current.model.problem.drive
-    found = [(effect.name, place) for effect, place in candidates(drive, names)]
-    driven = drive.prescribed
-    if not current.model.static or not driven:
-        return found
-    channels = tuple(replace(item, role="output") if item.part in driven else item for item in drive.channels)
-    free = candidates(replace(drive, channels=channels), names)
-    return list(dict.fromkeys([*found, *((effect.name, place) for effect, place in free if place in driven)]))
 
 
 def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:

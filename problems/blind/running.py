@@ -96,10 +96,13 @@ def confirmed(case: Case, problem: Path, accepted: Sequence[Pair], rival: Pair, 
     for path, copy in zip(quiet, copies, strict=True):
         copy.write_bytes(path.read_bytes())
     content["recordings"] = {"train": [path.name for path in quiet], "validation": [path.name for path in copies]}
-    others = [effect for effect, _ in accepted if (effect, _) != leader]
-    content["diagnosis"] = {"effects": sorted({rival[0], *others})}
+    others = sorted({effect for effect, component in accepted if (effect, component) != leader})
+    content["diagnosis"] = {"effects": [" at ".join(rival), *others]}
     write_text(folder / "problem.yaml", yaml.safe_dump(content, sort_keys=False))
-    result, _ = diagnosed(folder / "problem.yaml", folder / "-".join(rival))
+    try:
+        result, _ = diagnosed(folder / "problem.yaml", folder / "-".join(rival))
+    except Failed:
+        return False
     found = {(item["effect"], item["component"]) for item in result["accepted"]}
     after = [channel["noise_ratio"] for channel in result["gap"]["after"].values()]
     return rival in found and bool(np.max(after) < 1.0)

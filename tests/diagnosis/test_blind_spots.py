@@ -14,6 +14,7 @@ from friction_ocp.diagnosis.blind_spots import CERTAIN, BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitting import FittedModel, fit_base
+from friction_ocp.diagnosis.options import Considered
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 
@@ -23,7 +24,7 @@ import gaps
 
 def found(fitted: FittedModel, *names: str) -> dict[str, BlindSpot]:
     """Return what the recordings of a fit hide, by component, as if it left noise alone."""
-    spots = blind_spots(fitted, Excess(1.0, 1.0), clues_of(fitted), names)
+    spots = blind_spots(fitted, Excess(1.0, 1.0), clues_of(fitted), Considered(dict.fromkeys(names)))
     return {item.component: item for item in spots}
 
 

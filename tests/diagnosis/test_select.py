@@ -11,7 +11,7 @@ import pytest
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, choose, shown
+from friction_ocp.diagnosis.select import Choice, Round, choose, put_first, shown
 from friction_ocp.effects.effect import Augmentation
 
 COUNT = 60
@@ -63,3 +63,15 @@ def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
     disc = rival("sensor_eccentricity", "load_position", {"load_position.offset": 0.0, "load_position.wave": 0.0})
     assert shown((here, disc, there)) == (here, there)
     assert shown((disc, here)) == (disc, here)
+
+
+def test_another_of_an_alias_set_can_be_accepted() -> None:
+    """It stands first, those that leave the same residuals follow it, and no probability changes."""
+    one, other = rival("stribeck", "motor", {"a": 0.0}, gain=5.0), rival("cogging", "motor", {"b": 0.0}, gain=2.0)
+    alike = rival("unbalance", "motor", {"c": 0.0}, gain=2.0)
+    choice = Choice((one, other, alike), (0.5, 0.3, 0.2), 0.0, True, (one, other, alike), (one,))
+    turned = put_first(Round((), choice, cast(Any, None), cast(Any, None), one), other)
+    assert turned.accepted is other
+    assert turned.choice.aliases == (other, one, alike)
+    assert turned.choice.same == (other, alike)
+    assert turned.choice.probabilities == choice.probabilities

@@ -1,0 +1,183 @@
+"""Additions one by one: the rounds of a diagnosis, and what is gone over again between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from friction_ocp.diagnosis.bench import Bench, Crew, Tell
+from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.free_gap import free_errors, shrink
+from friction_ocp.diagnosis.held_out import folds
+from friction_ocp.diagnosis.options import NONE, Considered, places
+from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
+from friction_ocp.diagnosis.rival import Rival, is_same
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.diagnosis.select import Round, choose, put_first, shown, with_refused, withdrawn
+from friction_ocp.diagnosis.worth import (
+    Key,
+    gain,
+    innovations,
+    required,
+    shapes,
+    shortlist,
+    with_resembling,
+)
+from friction_ocp.statistics.execution import Execution
+
+MOST_ROUNDS = 4
+FINISHED, CLOSE = 2, 1.5
+"""Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
+this factor."""
+HOPE = 0.25
+"""Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
+
+
+@dataclass
+class Search:
+    """Adds to a base model what its recordings ask for, until noise is left or nothing helps."""
+
+    bench: Bench
+    """Of the model with what was accepted."""
+    run: Execution
+    meant: Considered
+    """What competes."""
+    level: float
+    tell: Tell
+    rounds: list[Round] = field(default_factory=list[Round])
+    accepted: list[Key] = field(default_factory=list[Key])
+    _begun: int = 0
+
+    def __post_init__(self) -> None:
+        self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
+
+    def go(self) -> None:
+        """Add until noise is left, nothing helps or the rounds are used up."""
+        for _ in range(MOST_ROUNDS):
+            done = self._round(self.bench, self.accepted, self.meant)
+            if done.accepted is None and done.excess.significant(self.level):
+                done = self._from_alias() or done
+            self.rounds.append(done)
+            if done.accepted is None:
+                break
+            self._take(done.accepted)
+            if not innovations(self.bench.current).significant(self.level):
+                self._settle()
+                break
+        if self.accepted and not self._helps():
+            self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
+
+    def _from_alias(self) -> Round | None:
+        """Go on from what the recordings could not tell from the last addition, where that itself leads nowhere.
+
+        Of two effects the one may be found only beside the other.
+        """
+        last = self.rounds[-1] if self.rounds else None
+        if last is None or last.accepted is None:
+            return None
+        before = [key for key in self.accepted if key != last.accepted.key]
+        for rival in shown(last.choice.aliases):
+            if rival.key in self.accepted or is_same(rival, last.accepted):
+                continue
+            bench, keys = self.bench.at(rival.fitted), [*before, rival.key]
+            done = self._round(bench, keys, self.meant)
+            if done.accepted is not None:
+                self.rounds[-1] = put_first(last, rival)
+                self.bench, self.accepted = bench, keys
+                return done
+        return None
+
+    def _take(self, rival: Rival) -> None:
+        """Add what a round has found; drop or exchange earlier additions that it makes superfluous."""
+        self.tell("examining earlier additions again", 0.0)
+        base, keys = self.bench.base, [*self.accepted, rival.key]
+        current, self.accepted = without_superfluous(base, rival.fitted, keys, self.level, self.rng)
+        self.bench = self.bench.at(current)
+        if innovations(current).significant(self.level):
+            self._exchange()
+
+    def _exchange(self) -> None:
+        base, current = self.bench.base, self.bench.current
+        found = exchanged(base, current, self.rounds, self.accepted, self.level, self.rng)
+        current, self.rounds, self.accepted = found
+        self.bench = self.bench.at(current)
+
+    def _settle(self) -> None:
+        """Go over additions that leave nothing but noise: their more general shapes, then the rivals of earlier ones.
+
+        What a shape leaves is too little to tell as power, and yet enough to tell rivals apart that are the same.
+        """
+        for _ in set(self.accepted):
+            done = self._round(self.bench, self.accepted, NONE)
+            if done.accepted is None:
+                break
+            self.bench, self.rounds = self.bench.at(done.accepted.fitted), [*self.rounds, done]
+            self.accepted = [*self.accepted, done.accepted.key]
+        if len(set(self.accepted)) > 1:
+            self.tell("weighing rivals of earlier additions again", 0.0)
+            self._exchange()
+
+    def _helps(self) -> bool:
+        """Whether what was added leaves nothing, explains more than it leaves, or makes free runs better elsewhere.
+
+        Else what is not known is the larger part, and what was added no more than its shadow. Free runs that are lost
+        say nothing.
+        """
+        base, current = self.bench.base, self.bench.current
+        left = innovations(current)
+        if not left.significant(self.level) or left.beyond < 0.5 * innovations(base).beyond:
+            return True
+        before, after = (free_errors(fitted, held_out=True) for fitted in (base, current))
+        return before.lost or shrink(before, after, self.bench.problem.estimation.seed).interval95[0] > 0.0
+
+    def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
+        """Decide on an addition to the model of a bench, or on a more general shape of what it has.
+
+        The shape of an accepted effect need not be worth an effect of its own.
+        """
+        self._begun += 1
+        number = self._begun
+        crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share))
+        current, blocks, level = bench.current, bench.blocks, self.level
+        enough = required(bench.base, current) if meant.names else np.inf
+        again = shapes(current, bench.clues, accepted)
+        found = crew.screened([*places(current, meant), *again])
+        power = excess(current.linear.rows, blocks)
+        hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
+        gap = power.significant(level)
+        chosen = with_resembling(shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found)
+        parts = len(folds(current))
+        choice = choose([], blocks, parts, level, self.rng)
+        for rivals in _completed(crew, chosen):
+            able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
+            fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
+            choice = choose(fit, blocks, parts, level, self.rng)
+            choice = with_refused(choice, tuple(item for item, yes in zip(rivals, able, strict=True) if not yes))
+            if choice.significant or not gap:
+                break
+        shape = next((item for item in choice.aliases if item.key in again), None)
+        best = (shape or choice.rivals[0]) if choice.significant else None
+        return Round(tuple(found), choice, current, power, best)
+
+
+def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
+    """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
+
+    What fits best where it was fitted may be worth nothing on recordings left out.
+    """
+    if not chosen:
+        return
+    without, refits = crew.without(chosen)
+    if not refits:
+        return
+    current = crew.bench.current
+    hopes = [min(refit.cost, current.cost - refit.screened.gain) for refit in refits]
+    count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
+    order = sorted(range(len(hopes)), key=lambda k: hopes[k])
+    pairs = [refits[k] for k in order]
+    rivals = crew.rivals(pairs[:count], without)
+    yield rivals
+    if len(pairs) > count:
+        yield [*rivals, *crew.rivals(pairs[count:], without)]

@@ -1,0 +1,67 @@
+"""What the file says about the catalogue: which effects compete, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from diagnosis_cases import axis, write_case
+
+from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.options import considered, level_of, places
+from friction_ocp.effects.registry import effects
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.problem import Problem
+from friction_ocp.problem_file.load import load_problem
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """Return a problem whose file says nothing about the catalogue."""
+    return replace(load_problem(write_case(tmp_path_factory.mktemp("options"), axis())), diagnosis={})
+
+
+def _said(problem: Problem, stated: Mapping[str, Any]) -> Problem:
+    return replace(problem, diagnosis=stated)
+
+
+def test_entries_are_effects_or_effects_at_a_place(problem: Problem) -> None:
+    """What the file names competes where it says, and what it excludes does not there."""
+    current = fit_base(prepare(problem))
+    everywhere = places(current, considered(problem))
+    assert considered(problem).names == list(effects())
+    assert {key for key in everywhere if key[0] == "cogging"} == {("cogging", "motor")}
+
+    meant = considered(_said(problem, {"effects": ["stribeck", "cogging at motor"]}))
+    assert places(current, meant) == [("stribeck", "motor"), ("cogging", "motor")]
+    assert meant.entries == ["stribeck", "cogging at motor"]
+
+    without = places(current, considered(_said(problem, {"exclude": ["stribeck", "cogging at motor"]})))
+    assert without == [key for key in everywhere if key not in (("stribeck", "motor"), ("cogging", "motor"))]
+
+
+@pytest.mark.parametrize(
+    ("stated", "where", "complaint"),
+    [
+        ({"effects": "cogging"}, "diagnosis.effects", "a list of effects"),
+        ({"effects": ["coging"]}, "diagnosis.effects", "unknown effect 'coging'"),
+        ({"exclude": ["cogging at moon"]}, "diagnosis.exclude", "cogging makes no sense at 'moon' of this drive"),
+    ],
+)
+def test_nonsense_is_told_with_its_place(
+    problem: Problem, stated: Mapping[str, Any], where: str, complaint: str
+) -> None:
+    """The error says which entry, what is wrong with it, and what would do."""
+    with pytest.raises(FrictionOcpError, match=complaint) as caught:
+        considered(_said(problem, stated))
+    assert where in str(caught.value)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.7, "high"])
+def test_a_level_is_a_probability(problem: Problem, level: object) -> None:
+    """Nothing else is taken."""
+    with pytest.raises(FrictionOcpError, match=r"between 0 and 0\.5"):
+        level_of(_said(problem, {"significance": level}))
