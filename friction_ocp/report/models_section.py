@@ -17,7 +17,8 @@ def models_section(found: Json, result: Json) -> StatisticSection:
     sizes = listed(f"{name} {significant(size, 3)}" for name, size in part(found, "effective_samples").items())
     note = (
         f"Independent samples, from the autocorrelation of the errors of the model with most parameters: {sizes}. "
-        "Likelihoods are those of the free run, the size of its errors estimated by channel. The rest of the page "
+        "Likelihoods are those of the free run and of static points, the size of their errors estimated by channel. "
+        "The rest of the page "
         "shows the best model."
     )
     return StatisticSection(

@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate
 from friction_ocp.estimation.horizon import fits_free_run, horizon
-from friction_ocp.estimation.problem import Problem, RecordingUse
+from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.statistics.answer import answer
 from friction_ocp.statistics.execution import Execution
@@ -38,9 +38,9 @@ class Comparison:
 
     candidates: tuple[Candidate, ...]
     ranked_by: Criterion
-    """`held_out` likelihood where there are validation recordings, else `aicc`."""
+    """`held_out` likelihood where there are validation recordings or points, else `aicc`."""
     effective_samples: Mapping[str, float]
-    """By channel: independent samples in the training recordings."""
+    """Independent errors of training: by channel, and of static points by kind."""
     ratios: tuple[LikelihoodRatio, ...]
     """Of all pairs of which one model is a special case of the other."""
     warnings: tuple[str, ...]
@@ -49,12 +49,12 @@ class Comparison:
 def compare(
     problems: Sequence[Problem], nested: Sequence[tuple[str, str]] = (), execution: Execution = Execution()
 ) -> Comparison:
-    """Fit several models of the same recordings and rank them.
+    """Fit several models of the same recordings and static points and rank them.
 
-    Likelihoods are those of the free run, with the size of the errors of each channel estimated beside the parameters
-    and samples counted as far as they are independent (`scores_of`, `effective_samples`). `nested` states pairs (name
-    of the special case, name of the general model) beside those that are recognised (`is_nested`). Raises
-    FrictionOcpError where the problems are not about the same samples.
+    Likelihoods are those of the free run and of static points, with the size of the errors of each channel, or kind of
+    points, estimated beside the parameters and samples counted as far as they are independent (`scores_of`,
+    `effective_samples`). `nested` states pairs (name of the special case, name of the general model) beside those that
+    are recognised (`is_nested`). Raises FrictionOcpError where the problems are not about the same samples.
     """
     names = names_of(problems)
     alike = _alike(problems, names)
@@ -65,7 +65,8 @@ def compare(
     candidates = [
         Candidate(name, item.estimate, scores_of(item.estimate, sizes)) for name, item in zip(names, found, strict=True)
     ]
-    criterion: Criterion = "held_out" if problems[0].validation else "aicc"
+    unseen = problems[0].validation or problems[0].static_validation
+    criterion: Criterion = "held_out" if unseen else "aicc"
     order = sorted(range(len(found)), key=lambda k: _rank(candidates[k].scores, criterion))
     ratios = likelihood_ratios([(names[k], found[k]) for k in order], nested)
     ranked = tuple(candidates[k] for k in order)
@@ -128,11 +129,12 @@ def _alike(problems: Sequence[Problem], names: Sequence[str]) -> list[Problem]:
 def _different_data(first: Problem, name: str, other: Problem, other_name: str) -> list[Finding]:
     """Return in which samples, channels and loss two problems differ."""
     findings: list[Finding] = []
-    for part in ("train", "validation"):
-        ours, theirs = (_recordings(getattr(problem, part)) for problem in (first, other))
+    parts: tuple[Literal["train"], Literal["validation"]] = ("train", "validation")
+    for part in parts:
+        ours, theirs = (_data(problem, part) for problem in (first, other))
         if ours.keys() != theirs.keys():
             odd = sorted({**ours, **theirs}[key] for key in ours.keys() ^ theirs.keys())
-            what = f"the {part} recordings differ from those of {name}: {', '.join(odd)}"
+            what = f"the {part} recordings or static points differ from those of {name}: {', '.join(odd)}"
             findings.append(Finding(other_name, what, "the same samples in all problems"))
     ours, theirs = ({channel.name for channel in problem.drive.outputs} for problem in (first, other))
     if ours != theirs:
@@ -144,8 +146,12 @@ def _different_data(first: Problem, name: str, other: Problem, other_name: str) 
     return findings
 
 
-def _recordings(uses: Sequence[RecordingUse]) -> dict[str, str]:
-    return {fingerprint(dict(use.recording.channels)): use.name for use in uses}
+def _data(problem: Problem, part: Literal["train", "validation"]) -> dict[str, str]:
+    """Return the names of recordings and static points by what they hold."""
+    runs = problem.train if part == "train" else problem.validation
+    points = problem.static if part == "train" else problem.static_validation
+    told = {fingerprint(dict(use.recording.channels)): use.name for use in runs}
+    return told | {fingerprint(use.points.sha256, dict(use.points.columns)): use.name for use in points}
 
 
 def _refuse_unknown(nested: Sequence[tuple[str, str]], names: Sequence[str]) -> None:

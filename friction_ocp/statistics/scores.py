@@ -1,14 +1,13 @@
-"""What a model is worth: likelihood of the free run, AICc, BIC, and the likelihood of what was held out."""
+"""What a model is worth: likelihood of free run and static points, AICc, BIC, and that of what was held out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friction_ocp.estimation.estimate import Estimate, Simulation
-from friction_ocp.estimation.score import FreeRun
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.block_length import effective_size
 
@@ -18,25 +17,56 @@ class Scores:
     """Criteria of one model; differences between models of the same samples mean something, values do not."""
 
     parameters: int
-    """Fitted ones, and one error size a channel."""
+    """Fitted ones, and one error size a channel or kind of static points."""
     log_likelihood: float
     aicc: float
     """Infinite where there are no more independent samples than parameters."""
     bic: float
     held_out: float | None
-    """Log-likelihood of the validation recordings with the error sizes of training; None where there are none."""
+    """Log-likelihood of what was held out with the error sizes of training; None where nothing was."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors that have one size: those of a channel, or of static points of one kind over their standard errors."""
+
+    train: FloatArray
+    unseen: FloatArray
+    """Of validation recordings or points."""
+    independent: float
+    """How many of the training errors are."""
+
+
+def errors_of(simulation: Simulation) -> Mapping[str, Errors]:
+    """Return errors by channel, and by what static points hold."""
+    found = dict[str, Errors]()
+    for column, name in enumerate(simulation.units):
+        series = [run.simulated[:, column] - run.measured[:, column] for run in simulation.train]
+        independent = sum(map(effective_size, series))
+        unseen = [run.simulated[:, column] - run.measured[:, column] for run in simulation.validation]
+        found[name] = Errors(_told(series), _told(unseen), independent)
+    for effort in dict.fromkeys(item.effort for item in simulation.static):
+        sets = [item for item in simulation.static if item.effort == effort]
+        scaled = {item.name: (item.predicted - item.measured) / item.std_error for item in sets}
+        train, unseen = (
+            _told([scaled[item.name] for item in sets if item.split == split]) for split in ("train", "validation")
+        )
+        found[f"{effort} of static points"] = Errors(train, unseen, float(train.size))
+    return {name: item for name, item in found.items() if item.train.size}
+
+
+def _told(series: Sequence[FloatArray]) -> FloatArray:
+    errors = np.concatenate([np.zeros(0), *series])
+    return errors[np.isfinite(errors)]
 
 
 def effective_samples(simulation: Simulation) -> Mapping[str, float]:
-    """Return for each channel how many independent errors the training recordings hold.
+    """Return how many independent errors the training recordings hold by channel, and static points by kind.
 
     Taken from the model with most parameters, whose errors are the nearest to noise, and used for all models (as the
     variance inflation of QAICc is: Burnham & Anderson 2002, section 2.5).
     """
-    return {
-        name: max(1.0, sum(effective_size(run.simulated[:, k] - run.measured[:, k]) for run in simulation.train))
-        for k, name in enumerate(simulation.units)
-    }
+    return {name: max(1.0, item.independent) for name, item in errors_of(simulation).items()}
 
 
 def scores_of(estimate: Estimate, sizes: Mapping[str, float]) -> Scores:
@@ -46,19 +76,14 @@ def scores_of(estimate: Estimate, sizes: Mapping[str, float]) -> Scores:
     too (concentrated likelihood): a noise floor that a model never reaches would make every difference decisive.
     """
     laplace = estimate.problem.estimation.loss != "squares"
-    simulation = estimate.simulation
-    train = dict(zip(simulation.units, _errors(simulation, simulation.train), strict=True))
-    spread = {name: _spread(errors, laplace) for name, errors in train.items()}
-    told = {name: errors for name, errors in train.items() if errors.size}
-    log_likelihood = sum(_log_likelihood(train[name], spread[name], sizes[name], laplace) for name in told)
-    held_out = None
-    if simulation.validation:
-        unseen = dict(zip(simulation.units, _errors(simulation, simulation.validation), strict=True))
-        held_out = sum(
-            _log_likelihood(unseen[name], spread[name], sizes[name] * unseen[name].size / train[name].size, laplace)
-            for name in told
-            if unseen[name].size
-        )
+    told = {name: item for name, item in errors_of(estimate.simulation).items() if name in sizes}
+    spread = {name: _spread(item.train, laplace) for name, item in told.items()}
+    log_likelihood = sum(_log_likelihood(item.train, spread[name], sizes[name], laplace) for name, item in told.items())
+    unseen = {name: item.unseen for name, item in told.items() if item.unseen.size}
+    held_out = sum(
+        _log_likelihood(errors, spread[name], sizes[name] * errors.size / told[name].train.size, laplace)
+        for name, errors in unseen.items()
+    )
     count, total = len(estimate.parameters) + len(told), sum(sizes[name] for name in told)
     spare = total - count - 1
     return Scores(
@@ -66,20 +91,11 @@ def scores_of(estimate: Estimate, sizes: Mapping[str, float]) -> Scores:
         log_likelihood=log_likelihood,
         aicc=-2.0 * log_likelihood + 2.0 * count * total / spare if spare > 0 else np.inf,
         bic=-2.0 * log_likelihood + count * float(np.log(total)),
-        held_out=held_out,
+        held_out=held_out if unseen else None,
     )
 
 
-def _errors(simulation: Simulation, runs: Sequence[FreeRun]) -> Iterator[FloatArray]:
-    """Yield the errors of each channel over all recordings."""
-    for column in range(len(simulation.units)):
-        errors = np.concatenate([run.simulated[:, column] - run.measured[:, column] for run in runs])
-        yield errors[np.isfinite(errors)]
-
-
 def _spread(errors: FloatArray, laplace: bool) -> float:
-    if not errors.size:
-        return 1.0
     size = float(np.mean(np.abs(errors))) if laplace else float(np.sqrt(np.mean(errors**2)))
     return max(size, 1e-300)
 

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from runs import HERE, CoulombViscous, Free, right_problem, with_law
 
+from friction_ocp.drive.parts import Drive
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.problem import StaticUse
 from friction_ocp.friction.static import Coulomb, Stribeck, Viscous
+from friction_ocp.recording.static_points import StaticPoints
 from friction_ocp.statistics.compare import Comparison, compare
 from friction_ocp.statistics.scores import scores_of
 
@@ -82,6 +85,40 @@ def test_a_special_case_may_be_stated() -> None:
         compare([few, many], [("viscous", "dry")], HERE)
 
 
+def test_static_points_are_compared_like_recordings() -> None:
+    """They alone are enough; their errors over their standard errors have a size of their own."""
+    rng, error = np.random.default_rng(3), 2e-3
+    speed = np.concatenate([side * np.geomspace(0.05, 20.0, 15) for side in (1.0, -1.0)])
+
+    def points(name: str) -> StaticPoints:
+        needed = np.sign(speed) * (0.07 + 0.05 * np.exp(-((speed / 0.8) ** 2))) + 2.2e-3 * speed
+        torque = needed + error * rng.standard_normal(speed.size)
+        units = {"speed": "rad/s", "torque": "N m", "std_error": "N m"}
+        return StaticPoints(name, speed, units, torque=torque, std_error=np.full(speed.size, error))
+
+    known = {"static": (StaticUse(points("first")),), "static_validation": (StaticUse(points("second")),)}
+    laws = {"right": RIGHT, "stribeck": LARGE}
+    bare = [replace(with_law(law), title=name, train=(), **known) for name, law in laws.items()]
+    problems = [replace(item, drive=fixed_inertia(item.drive)) for item in bare]
+    found = compare(problems, execution=HERE)
+    assert found.effective_samples == {"torque of static points": speed.size}
+    assert found.ranked_by == "held_out"
+    best, other = found.candidates
+    assert best.name == "stribeck"
+    assert best.scores.held_out is not None
+    assert other.scores.held_out is not None
+    assert best.scores.held_out > other.scores.held_out + 10
+    fitted, unseen = best.estimate.simulation.static
+    size = fitted.noise_ratio
+    expected = -speed.size * (0.5 * np.log(2 * np.pi) + np.log(size) + 0.5 * (unseen.noise_ratio / size) ** 2)
+    assert best.scores.held_out == pytest.approx(expected)
+
+
+def fixed_inertia(drive: Drive) -> Drive:
+    """Return a drive whose inertia is known: static points say nothing about it."""
+    return replace(drive, shafts=tuple(replace(shaft, inertia=1e-3) for shaft in drive.shafts))
+
+
 def test_other_data_are_refused() -> None:
     """Recordings, loss and number of problems: every difference in a line of its own."""
     base = replace(right_problem(), title="a")
@@ -92,7 +129,7 @@ def test_other_data_are_refused() -> None:
         compare([base, other], execution=HERE)
     lines = [str(finding) for finding in caught.value.findings]
     assert lines == [
-        "b: the train recordings differ from those of a: draw2; the same samples in all problems",
+        "b: the train recordings or static points differ from those of a: draw2; the same samples in all problems",
         "b: the loss is huber, in a squares; the same loss in all problems",
     ]
 
