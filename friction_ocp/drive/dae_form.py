@@ -15,7 +15,7 @@ from friction_ocp.dae import Dae, Variable
 from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds
 from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
-from friction_ocp.drive.kick import through_joint, transmitted_torque
+from friction_ocp.drive.kick import motor_loads, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import extra_rates, lag_rates
 from friction_ocp.drive.parts import Drive
@@ -109,7 +109,8 @@ def _symbols(mech: Mechanism) -> _Symbols:
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
     elastic = {item.name: elastic_torque(mech, item, at, width) for item in mech.topology.elastic}
-    return elastic | {joint.name: symbols.torques[k] for k, joint in enumerate(mech.loaded_joints())}
+    rigid = {joint.name: symbols.torques[k] for k, joint in enumerate(mech.loaded_joints())}
+    return elastic | rigid | motor_loads(mech, at)
 
 
 def _friction(

@@ -16,6 +16,7 @@ import casadi as ca
 
 from friction_ocp.drive.coordinates import group_accelerations
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
+from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.drive.torques import applied_torques, elastic_torque
 from friction_ocp.friction.element import FrictionElement, StepResponse
@@ -53,7 +54,7 @@ class Kick:
     mean: ca.SX
     """(groups,) mean speeds over the step."""
     load: dict[str, Any]
-    """Torque through each transmission that friction depends on, on its output side."""
+    """Torques that friction depends on: through each transmission on its output side, and of each motor."""
     torques: dict[str, Any]
     """Torque on each shaft other than friction and torque through rigid joints."""
     friction: dict[str, Any]
@@ -83,7 +84,7 @@ def implicit_kick(mech: Mechanism, step: Step) -> Kick:
     torques, stiffening = _applied(mech, step)
     corner = step.width[len(mech.topology.roots)]
     load = {item.name: elastic_torque(mech, item, step.at, corner) for item in mech.topology.elastic}
-    load |= {joint.name: symbols[k] for k, joint in enumerate(joints)}
+    load |= {joint.name: symbols[k] for k, joint in enumerate(joints)} | motor_loads(mech, step.at)
     v, mean, friction = _solve(mech, step, torques, stiffening, load)
     friction |= _prescribed_friction(mech, step, load)
     if not joints:
@@ -123,14 +124,22 @@ def _group_sum(mech: Mechanism, at: Motion, group: int, torques: dict[str, Any])
     return sum(mech.speed_ratio(name, at) * torques[name] for name in mech.topology.members(group))
 
 
+def motor_loads(mech: Mechanism, at: Motion) -> dict[str, Any]:
+    """Return the torques of the motors that load a shaft by themselves."""
+    return {motor.name: motor_torque(mech, motor, at) for motor in mech.loading_motors()}
+
+
 def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> Any:
-    """Return |torque| that loads the friction of a shaft, on the shaft's own side."""
+    """Return |torque| that loads the friction of a shaft, on the shaft's own side: that through its joints.
+
+    A shaft without any is loaded by its motors: they may be one part with a gear inside.
+    """
     if shaft.friction.load is None:
         return 0.0
     torques = [
         load[joint.name] / joint.ratio if joint.from_shaft == shaft.name else load[joint.name]
         for joint in mech.load_joints(shaft)
-    ]
+    ] or [load[motor.name] for motor in mech.motors_on(shaft)]
     return smooth_abs(sum(torques[1:], torques[0]))
 
 

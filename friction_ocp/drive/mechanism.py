@@ -150,14 +150,26 @@ class Mechanism:
         return tuple(joint for joint in self.topology.rigid if joint.name in joints)
 
     def load_joints(self, shaft: Shaft) -> tuple[Transmission, ...]:
-        """Return the transmissions that load a shaft: all on its output side, else all on its input side."""
+        """Return the transmissions that load a shaft: all on its output side, else all on its input side.
+
+        None load a shaft that stands alone, which its motors load; raises FrictionOcpError where it has none.
+        """
         drive = self.drive
         onward = [item for item in drive.transmissions if item.from_shaft == shaft.name]
         backward = [item for item in drive.transmissions if item.to_shaft == shaft.name]
-        if not onward + backward:
-            what = "friction depends on the transmitted torque, but no transmission ends here"
+        if not (onward or backward or self.motors_on(shaft)):
+            what = "friction depends on the transmitted torque, but there is neither a transmission nor a motor"
             raise FrictionOcpError(Finding(f"{shaft.name}.friction.load", what, remedy="leave the load dependence out"))
         return tuple(onward or backward)
+
+    def motors_on(self, shaft: Shaft) -> tuple[Motor, ...]:
+        """Return the motors that drive a shaft."""
+        return tuple(motor for motor in self.drive.motors if motor.shaft == shaft.name)
+
+    def loading_motors(self) -> tuple[Motor, ...]:
+        """Motors whose own torque loads the friction of their shaft: a gear between them is part of that shaft."""
+        loaded = [shaft for shaft in self.drive.shafts if shaft.friction.load is not None]
+        return tuple(motor for shaft in loaded if not self.load_joints(shaft) for motor in self.motors_on(shaft))
 
     def shaft_angle(self, name: str, motion: Motion) -> Any:
         """Return the angle of a shaft."""

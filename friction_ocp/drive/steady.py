@@ -13,7 +13,7 @@ import casadi as ca
 
 from friction_ocp.drive.kick import Unknown, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism
-from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.torques import applied_torques
 
@@ -86,6 +86,7 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
     joints = mech.loaded_joints()
     symbols = ca.SX.sym("unknown", len(joints) + 1)
     load: dict[str, Any] = {joint.name: symbols[k] for k, joint in enumerate(joints)}
+    load |= {motor.name: symbols[-1] * _torque(motor, effort) for motor in mech.loading_motors()}
     at = Motion(angles, speeds, ca.SX.zeros(0), ca.SX.zeros(0))
     torques = applied_torques(mech, at, 0.0)
     friction = {
@@ -98,7 +99,7 @@ def _balanced(mech: Mechanism, shaft: str, effort: Effort, omega: ca.SX, theta: 
     driving = _driving(mech, group, effort) if mech.drive.motors else {shaft: 1.0}
     per_command = sum(topology.speed_ratio[name] * torque for name, torque in driving.items())
     command = ca.SX(sum(resisting)) / per_command
-    if not joints:
+    if not joints and not mech.loading_motors():
         return command
     driven = {name: torque + symbols[-1] * driving.get(name, 0.0) for name, torque in torques.items()}
     still = ca.SX.zeros(groups)
@@ -111,6 +112,10 @@ def _driving(mech: Mechanism, group: int, effort: Effort) -> dict[str, Any]:
     torques: dict[str, Any] = {}
     for motor in mech.drive.motors:
         if mech.topology.group_of[motor.shaft] == group:
-            torque = motor.share * (motor.torque_constant if effort == "current" else 1.0)
-            torques[motor.shaft] = torques.get(motor.shaft, 0.0) + torque
+            torques[motor.shaft] = torques.get(motor.shaft, 0.0) + _torque(motor, effort)
     return torques
+
+
+def _torque(motor: Motor, effort: Effort) -> Any:
+    """Return the torque of a motor for a command of one."""
+    return motor.share * (motor.torque_constant if effort == "current" else 1.0)

@@ -86,6 +86,7 @@ class LoadDependenceEffect(AbstractEffect):
 
     def places(self, drive: Drive) -> Iterable[str]:
         ends = {name for item in drive.transmissions for name in (item.from_shaft, item.to_shaft)}
+        ends |= {motor.shaft for motor in drive.motors}
         for shaft in moving_shafts(drive):
             if shaft.name in ends and is_dry(shaft) and shaft.friction.load is None:
                 yield shaft.name

@@ -71,7 +71,9 @@ def _loads(model: Model, shaft: Shaft, theta: FloatArray, runs: tuple[FreeRun, .
     mech = model.drive.mechanism
     q = ca.SX.sym("q", len(mech.topology.roots))
     at = Motion(q, ca.SX.zeros(q.numel()), ca.SX.zeros(8), ca.SX.zeros(16))
-    size = transmitted_torque(mech, shaft, {joint.name: _held(mech, joint, at) for joint in mech.load_joints(shaft)})
+    held = {joint.name: _held(mech, joint, at) for joint in mech.load_joints(shaft)}
+    held |= {motor.name: motor.share * _gravity(mech, shaft.name, at) for motor in mech.loading_motors()}
+    size = transmitted_torque(mech, shaft, held)
     inputs = ca.vertcat(*mech.inputs.values())
     function = ca.Function("load", [q, inputs, ca.vertcat(*mech.parameters.values())], [size])
     largest = 0.0

@@ -45,6 +45,11 @@ CASES: dict[str, tuple[Callable[[], Plant], str, tuple[str, ...]]] = {
     "polyline_break": (shaft(friction=BREAK), "motor", ("quadratic_drag", "stribeck")),
     "quadratic_drag": (lambda: axis(law="quadratic", quadratic=1e-5), "motor", ("polyline_break", "asymmetry")),
     "asymmetry": (lambda: axis(viscous=(1.3 * VISCOUS, 0.7 * VISCOUS)), "motor", ("constant_torque", "unbalance")),
+    "load_dependence": (
+        shaft(friction=PlantFriction("coulomb_viscous", COULOMB, viscous=VISCOUS, load_coulomb=0.15)),
+        "motor",
+        ("quadratic_drag", "torque_saturation"),
+    ),
     "position_ripple": (shaft(ripple=PlantRipple(7.0, (0.4,), (0.0,))), "motor", ("cogging", "torque_ripple")),
     "warm_up": (shaft(warm_up=PlantWarmUp(2.0, -0.3, -0.5, 0.0)), "motor", ("quadratic_drag", "drive_lag")),
     "cogging": (motor(cogging=PlantRipple(3.1, (0.1 * TORQUE,), (0.0,))), "motor", ("torque_ripple", "unbalance")),

@@ -92,10 +92,18 @@ def test_a_lift_holds_between_its_limits() -> None:
     assert speeds[0] < 0.0 and speeds[1] == 0.0 and speeds[2] == 0.0 and speeds[3] > 0.0
 
 
-def test_load_dependence_needs_a_transmission() -> None:
-    """On a shaft that transmits nothing, load-dependent friction is refused with the shaft's name."""
+@pytest.mark.parametrize("law", LOADED)
+def test_a_lone_shaft_is_loaded_by_its_motor(law: str) -> None:
+    """A joint that is modelled as one inertia has its gear inside: friction grows with the torque of the motor."""
+    shaft = PlantShaft("motor", 0.05, LOADED[law], (0.5, 0.3))
+    truth, run = Twin(Plant((shaft,), (), MOTOR), {"drive.current": reversals()}).run(2.0)
+    assert worst(truth, run, "motor.theta", "motor.omega") < STEP_ERROR
+
+
+def test_load_dependence_needs_what_loads() -> None:
+    """On a shaft that neither transmits a torque nor has a motor it is refused with the shaft's name."""
     lone = Drive((Shaft("axis", 0.01, FrictionElement(Coulomb(0.1), LoadDependence(0.1))),))
-    with pytest.raises(FrictionOcpError, match=r"axis\.friction\.load: .*no transmission"):
+    with pytest.raises(FrictionOcpError, match=r"axis\.friction\.load: .*neither a transmission nor a motor"):
         stepped(lone)
 
 

@@ -41,6 +41,7 @@ CHAINS: dict[str, Plant] = {
     "loaded": Plant(
         (PlantShaft("a", 0.001, LOADED), PlantShaft("b", 0.02, SLOW)), (PlantTransmission("a", "b", 5.0),), motors("a")
     ),
+    "loaded alone": Plant((PlantShaft("a", 0.001, LOADED),), (), motors("a")),
     "two chains": Plant(
         (PlantShaft("a", 0.001, FAST), PlantShaft("b", 0.02, SLOW), PlantShaft("c", 0.001, LOADED)),
         (PlantTransmission("a", "b", 5.0, 400.0, 5.0), PlantTransmission("c", "b", 5.0, 400.0, 5.0)),

@@ -170,6 +170,7 @@ def assemble_mechanics(shafts: Sequence[PlantShaft], transmissions: Sequence[Pla
         else:
             joint.append((i, j))
             elastic.append((part.ratio, part.stiffness, part.damping, 0.5 * part.backlash))
+    ends = {name for part in transmissions for name in (part.from_shaft, part.to_shaft)}
     groups, parent, forward, scale = _grow_groups(len(shafts), rigid)
     inertia = np.array([float(shaft.inertia) for shaft in shafts])
     group = np.zeros(len(shafts), dtype=np.int64)
@@ -186,7 +187,9 @@ def assemble_mechanics(shafts: Sequence[PlantShaft], transmissions: Sequence[Pla
         group_inertia=np.bincount(group, inertia * scale**2),
         law=np.array([_law_code(shaft.friction) for shaft in shafts]),
         friction=np.array([_friction_columns(shaft.name, shaft.friction) for shaft in shafts]),
-        applied=np.array([(*shaft.gravity, shaft.external_torque) for shaft in shafts], dtype=float),
+        applied=np.array(
+            [(*shaft.gravity, shaft.external_torque, shaft.name not in ends) for shaft in shafts], dtype=float
+        ),
         joint=np.array(joint, dtype=np.int64).reshape(-1, 2),
         elastic=np.array(elastic, dtype=float).reshape(-1, 4),
     )
@@ -207,7 +210,7 @@ def group_traits(mechanics: Mechanics, prescribed: Mapping[int, int], added: Seq
         if np.any(m.friction[i][:, [LOAD_C, LOAD_S, LOAD_V]] != 0):
             if np.any((m.parent == i) & (m.forward == 1)):
                 traits[m.group[i], 1] = 1
-            elif not np.any(m.joint[:, 0] == i):
+            elif not np.any(m.joint[:, 0] == i) and m.applied[i, 3] == 0.0:
                 raise ValueError(f"plant: shaft {i} has load-dependent friction but passes no torque on downstream")
     for i, column in prescribed.items():
         root = int(m.shaft[m.first[m.group[i]]])

@@ -51,7 +51,7 @@ MODEL = np.dtype(
         ),  # set-valued, implicit in the joint torque, input of the prescribed speed or -1
         ("law", INT, (SHAFTS,)),
         ("friction", FLOAT, (SHAFTS, 2, COLUMNS)),  # by direction
-        ("applied", FLOAT, (SHAFTS, 3)),  # gravity torque, gravity phase, constant torque
+        ("applied", FLOAT, (SHAFTS, 4)),  # gravity torque, gravity phase, constant torque, 1 where no joint ends
         ("external", INT, (SHAFTS,)),  # input or -1
         ("noise_std", FLOAT, (SHAFTS,)),  # torque held for one step
         ("joint", INT, (JOINTS, 2)),  # from, to
@@ -90,7 +90,7 @@ STATE = np.dtype(
         ("bristle", FLOAT, (SHAFTS, 8)),
         ("memory", FLOAT, (SHAFTS,)),  # bristle rate of the step, or level of springs that slip, positive direction
         ("opposite", FLOAT, (SHAFTS,)),  # the same level, negative direction
-        ("force", FLOAT, (SHAFTS, 7)),  # applied, its slope, passed on, friction A, B, torque T, work space
+        ("force", FLOAT, (SHAFTS, 8)),  # applied, its slope, passed on, friction A, B, torque T, work space, motors
         ("joint_torque", FLOAT, (JOINTS,)),
         # current, torque, voltage at start and end, mean voltage, inductive current, command at start and end, kt
         ("motor", FLOAT, (MOTORS, 11)),

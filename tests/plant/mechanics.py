@@ -150,7 +150,8 @@ def acceleration(m, st, g, omega, middle, d, h):
         for k in range(m.first[g], m.first[g + 1]):
             i = m.shaft[k]
             s = m.scale[i]
-            fa, fb = friction_line(m, st, i, s * middle, d if s > 0.0 else -d, abs(st.force[i, 2]), h)
+            load = abs(st.force[i, 2]) + abs(st.force[i, 7])
+            fa, fb = friction_line(m, st, i, s * middle, d if s > 0.0 else -d, load, h)
             st.force[i, 3] = fa
             st.force[i, 4] = fb
             drive += s * (st.force[i, 0] - st.force[i, 2] - fa)

@@ -40,7 +40,8 @@ Law = Literal[
 class PlantFriction:
     """Friction of one shaft; only what `law` uses is read, `viscous` being sigma2 of the bristle laws.
 
-    The torque opposes omega. Levels grow with the torque T that the shaft passes on towards the load:
+    The torque opposes omega. Levels grow with the torque T that the shaft passes on towards the load, or, where it
+    stands alone, with that of its motors:
     Coulomb part + load_coulomb |T|, Stribeck part + load_stribeck |T|, viscous part + load_viscous |T|.
     sigma0 and sigma1 follow the sign of the deflection, everything else the sign of the speed. The dry part of
     polyline_hysteresis is a spring that slips at tau_c and turns from one direction to the other over the travel

@@ -60,6 +60,7 @@ def drive_motors(m, st, n):
             row[2] = kt * ripple * saturated(form, limit, sharpness, begin)
             row[3] = kt * ripple * saturated(form, limit, sharpness, end)
             st.force[i, 0] += 0.5 * (row[2] + row[3])
+            st.force[i, 7] += 0.5 * (row[2] + row[3]) * m.applied[i, 3]
             continue
         row[4], row[5], row[6] = begin, end, 0.5 * (begin + end)
         kt *= ripple
@@ -68,8 +69,10 @@ def drive_motors(m, st, n):
         row[10] = kt
         x = resistance * m.step / inductance if inductance > 0.0 else math.inf
         phi = -math.expm1(-x) / x
-        st.force[i, 0] += kt * (row[7] * phi + row[6] / resistance * (1.0 - phi))
-        st.force[i, 1] += kt * kt / resistance * (1.0 - phi)
+        torque, slope = kt * (row[7] * phi + row[6] / resistance * (1.0 - phi)), kt * kt / resistance * (1.0 - phi)
+        st.force[i, 0] += torque
+        st.force[i, 1] += slope
+        st.force[i, 7] += (torque - slope * m.scale[i] * st.omega[m.group[i], 2]) * m.applied[i, 3]
 
 
 @njit
@@ -110,7 +113,7 @@ def load_shafts(m, st, noise):
         if m.noise_std[i] > 0.0:
             torque += m.noise_std[i] * noise[i]
             st.alpha[g, 2] += m.scale[i] * m.noise_std[i] * noise[i] / m.group_inertia[g]
-        st.force[i, 0], st.force[i, 1], st.force[i, 2] = torque, 0.0, 0.0
+        st.force[i, 0], st.force[i, 1], st.force[i, 2], st.force[i, 7] = torque, 0.0, 0.0, 0.0
     for e in range(m.joints):
         i, j = m.joint[e, 0], m.joint[e, 1]
         ratio = m.elastic[e, 0]

@@ -202,9 +202,10 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2, 3], "breaks": [2, {"guess": 1}]}),
         "drive.shafts[0].friction.breaks: the breaks are 2, 1; positive speeds that rise",
     ),
-    "load without transmission": (
-        put(f"{FRICTION}/load", {"coulomb": 0.1}),
-        "drive.shafts[0].friction.load: friction of 'load' depends on load, and there is no transmission beside it",
+    "load without a load": (
+        several(put(f"{FRICTION}/load", {"coulomb": 0.1}), drop("drive/motor"), drop("channels/current")),
+        "drive.shafts[0].friction.load: friction of 'load' depends on load, and it has neither a transmission nor a "
+        "motor",
     ),
     "load Stribeck without speed": (
         put(FRICTION, {"law": "coulomb", "tau_c": 1, "load": {"stribeck": 0.1}}),

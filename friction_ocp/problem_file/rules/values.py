@@ -107,11 +107,12 @@ def _breaks(law: AbstractFrictionLaw, direction: Direction) -> tuple[float, ...]
 
 
 def load_dependence_has_a_load(case: Case) -> Iterator[Finding]:
-    """Only a shaft beside a transmission transmits a torque on which its friction could depend."""
-    ends = {name for item in case.drive.transmissions for name in (item.from_shaft, item.to_shaft)}
+    """Only a shaft beside a transmission, or with a motor, transmits a torque on which its friction could depend."""
+    driven = {motor.shaft for motor in case.drive.motors}
+    ends = driven | {name for item in case.drive.transmissions for name in (item.from_shaft, item.to_shaft)}
     for k, shaft in enumerate(case.drive.shafts):
         if shaft.friction.load is not None and shaft.name not in ends:
-            what = f"friction of '{shaft.name}' depends on load, and there is no transmission beside it"
+            what = f"friction of '{shaft.name}' depends on load, and it has neither a transmission nor a motor"
             yield Finding(case.at(f"drive.shafts[{k}].friction.load"), what, remedy="add the shaft that loads it")
 
 
