@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, wit
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz
+from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import Key, required
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.simulation.grid import FloatArray
@@ -76,11 +76,14 @@ def exchanged(
             if more or benchmark.simpler(swapped):
                 seen.add(held.key)
                 held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
-                item = replace(item, accepted=rival, choice=_turned(item.choice, rival))
+                item = replace(item, accepted=rival, choice=turned(item.choice, rival))
                 tried, others = list[Rival](), _others(item.choice, [*accepted, *seen])
             else:
                 tried.append(rival.refitted(swapped, gains))
-        done[index] = _weighed_again(item, benchmark, tried, level, rng)
+        done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
+        if leader is not None:
+            current, benchmark = leader.fitted, _Benchmark(leader.fitted)
+            accepted = [leader.key if other == held.key else other for other in accepted]
     return current, done, accepted
 
 
@@ -102,33 +105,35 @@ def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequenc
 
 
 def _weighed_again(
-    item: Round, benchmark: _Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
-) -> Round:
-    """Return a round with the chances that rivals have in the place of what it accepted, now that others are in.
+    item: Round, held: Rival, benchmark: _Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
+) -> tuple[Round, Rival | None]:
+    """Return a round with the chances that rivals have in the place of what it `held`, now that others are in.
 
-    What they gain is counted from what was accepted, which is worth what it was.
+    What they gain is counted from what was accepted, which is worth what it was. Where one of them is now the more
+    probable it is accepted instead, and returned beside, with its fit.
     """
-    if item.accepted is None or not tried:
-        return item
+    if not tried:
+        return item, None
     known = dict(zip((rival.key for rival in item.choice.rivals), item.choice.probabilities, strict=True))
-    worth = np.full(benchmark.blocks.count, float(np.sum(item.accepted.gains)) / benchmark.blocks.count)
-    own = item.accepted.refitted(benchmark.fitted, worth)
+    worth = np.full(benchmark.blocks.count, float(np.sum(held.gains)) / benchmark.blocks.count)
+    own = held.refitted(benchmark.fitted, worth)
     others = [replace(rival, gains=worth + rival.gains) for rival in tried]
     again = choose([own, *others], benchmark.blocks, len(folds(benchmark.fitted)), level, rng)
     keys = {rival.key for rival in again.rivals}
     shared = sum(known[key] for key in keys)
     known |= {rival.key: shared * chance for rival, chance in zip(again.rivals, again.probabilities, strict=True)}
-    aliases = [own, *(rival for rival in again.aliases if rival is not own)]
+    leader = again.rivals[0]
+    aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]
     aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
-    order = sorted(item.choice.rivals, key=lambda rival: (rival is not item.accepted, -known[rival.key]))
+    order = sorted(item.choice.rivals, key=lambda rival: (rival.key != leader.key, -known[rival.key]))
     choice = replace(
         item.choice,
         rivals=tuple(order),
         probabilities=tuple(known[rival.key] for rival in order),
         aliases=tuple(aliases),
-        same=(own, *(rival for rival in others if is_same(rival, own))),
+        same=(leader, *(rival for rival in again.rivals if rival is not leader and is_same(rival, leader))),
     )
-    return replace(item, choice=choice)
+    return replace(item, accepted=order[0], choice=choice), None if leader is own else leader
 
 
 @dataclass(frozen=True)
@@ -158,13 +163,3 @@ class _Benchmark:
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""
         return bool(np.quantile(resamples(self.blocks, rng) @ gains, level) > 0)
-
-
-def _turned(choice: Choice, rival: Rival) -> Choice:
-    """Return a choice that another rival has won, for certain: the two have changed places."""
-    order = [rival, *(other for other in choice.rivals if other is not rival)]
-    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
-    first = choice.rivals[0].key
-    chances[first], chances[rival.key] = chances[rival.key], chances[first]
-    found = tuple(chances[item.key] for item in order)
-    return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=(rival,))

@@ -118,12 +118,21 @@ def withdrawn(item: Round) -> Round:
     return replace(item, choice=with_refused(NOTHING, item.choice.rivals), accepted=None)
 
 
+def turned(choice: Choice, rival: Rival) -> Choice:
+    """Return a choice that another rival has won, for certain: it and the first have changed places."""
+    order = [rival, *(other for other in choice.rivals if other is not rival)]
+    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
+    first = choice.rivals[0].key
+    chances[first], chances[rival.key] = chances[rival.key], chances[first]
+    found = tuple(chances[item.key] for item in order)
+    return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=(rival,))
+
+
 def put_first(item: Round, rival: Rival) -> Round:
-    """Return a round that has accepted another rival of its alias set."""
-    choice = item.choice
-    aliases = (rival, *(other for other in choice.aliases if other is not rival))
-    same = (rival, *(other for other in choice.rivals if other is not rival and is_same(other, rival)))
-    return replace(item, choice=replace(choice, aliases=aliases, same=same), accepted=rival)
+    """Return a round that has accepted another rival of its alias set, which excludes none of the others."""
+    aliases = (rival, *(other for other in item.choice.aliases if other is not rival))
+    same = (rival, *(other for other in item.choice.rivals if other is not rival and is_same(other, rival)))
+    return replace(item, choice=replace(turned(item.choice, rival), aliases=aliases, same=same), accepted=rival)
 
 
 def price(blocks: Blocks, parts: int) -> float:

@@ -66,12 +66,13 @@ def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
 
 
 def test_another_of_an_alias_set_can_be_accepted() -> None:
-    """It stands first, those that leave the same residuals follow it, and no probability changes."""
+    """It takes the place and the probability of the first, and those that leave the same residuals stand with it."""
     one, other = rival("stribeck", "motor", {"a": 0.0}, gain=5.0), rival("cogging", "motor", {"b": 0.0}, gain=2.0)
     alike = rival("unbalance", "motor", {"c": 0.0}, gain=2.0)
     choice = Choice((one, other, alike), (0.5, 0.3, 0.2), 0.0, True, (one, other, alike), (one,))
-    turned = put_first(Round((), choice, cast(Any, None), cast(Any, None), one), other)
-    assert turned.accepted is other
-    assert turned.choice.aliases == (other, one, alike)
-    assert turned.choice.same == (other, alike)
-    assert turned.choice.probabilities == choice.probabilities
+    moved = put_first(Round((), choice, cast(Any, None), cast(Any, None), one), other)
+    assert moved.accepted is other
+    assert moved.choice.aliases == (other, one, alike)
+    assert moved.choice.same == (other, alike)
+    assert moved.choice.rivals == (other, one, alike)
+    assert moved.choice.probabilities == (0.5, 0.3, 0.2)
