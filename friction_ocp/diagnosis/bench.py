@@ -42,6 +42,10 @@ Tell = Callable[[str, float], None]
 LOSSES = (Absolute, Huber, Squares, StudentT)
 
 
+_built: dict[str, FittedModel] = {}
+"""The base model that was built last, by all that decides it."""
+
+
 @dataclass(frozen=True)
 class Seat:
     """Where a fit stands, as a file can hold it: all that it takes to linearise it again, in any process."""
@@ -66,10 +70,13 @@ class Bench:
 
     @cached_property
     def base(self) -> FittedModel:
-        """The base model on its footing."""
-        model = judged_alike(prepare(self.problem))
-        train = restored_footing(self.footing, model)
-        return seated(model, train, self.base_point)
+        """The base model on its footing; a process builds that of the rounds of one diagnosis once."""
+        key = fingerprint(Workshop(self.problem).fingerprint, json.dumps([self.footing, self.base_point]))
+        if key not in _built:
+            model = judged_alike(prepare(self.problem))
+            _built.clear()
+            _built[key] = seated(model, restored_footing(self.footing, model), self.base_point)
+        return _built[key]
 
     @cached_property
     def current(self) -> FittedModel:

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from friction_ocp.diagnosis.bench import Tell, open_bench
+from friction_ocp.diagnosis.bench import Tell, open_bench, screen_candidate
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
@@ -153,9 +153,9 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     began = time.perf_counter()
     level, meant = level_of(problem), considered(problem)
     tell("base model", 0.0)
-    bench = open_bench(problem, execution)
-    base = bench.base
-    with execution.executor.kept() as executor:
+    with execution.executor.kept(screen_candidate) as executor:
+        bench = open_bench(problem, execution)
+        base = bench.base
         search = Search(bench, replace(execution, executor=executor), meant, level, tell)
         search.go()
     rounds, accepted = search.rounds, search.accepted

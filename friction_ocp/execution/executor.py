@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,12 +17,16 @@ class AbstractExecutor(ABC):
     def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
         """Yield the outcome of every task as it ends, in any order; `shared` goes to each worker once.
 
-        Closing the iterator stops whatever still runs.
+        It is not to be changed afterwards: workers that are kept have it still when it is shared again. Closing the
+        iterator stops whatever still runs.
         """
 
     @contextmanager
-    def kept(self) -> Generator[AbstractExecutor]:
-        """Keep what is costly to start for several runs within."""
+    def kept(self, function: Callable[..., Any] | None = None) -> Generator[AbstractExecutor]:
+        """Keep what is costly to start for several runs within, and start it now.
+
+        Whatever tasks with this `function` need is loaded beforehand, while their author is still busy.
+        """
         yield self
 
 

@@ -11,7 +11,7 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -41,9 +41,11 @@ class Processes(AbstractExecutor):
             yield from kept.run(tasks, shared)
 
     @contextmanager
-    def kept(self) -> Generator[AbstractExecutor]:
-        team = _Team(self.workers)
+    def kept(self, function: Callable[..., Any] | None = None) -> Generator[AbstractExecutor]:
+        team = _Team(self.workers, function)
         try:
+            if function is not None:
+                team.hire(self.workers)
             yield team
         finally:
             team.dismiss()
@@ -55,25 +57,26 @@ class _Worker:
     connection: Connection
     ready: bool = False
     task: Task | None = None
-    run: int = 0
-    """The run whose shared argument it has."""
+    version: int = 0
+    """The shared argument that it has."""
 
 
 class _Team(AbstractExecutor):
     """Workers, what each is doing, and what is left to do; they stay from one run to the next."""
 
-    def __init__(self, size: int) -> None:
-        self._size, self._run = size, 0
-        self._shared: bytes = b""
+    def __init__(self, size: int, function: Callable[..., Any] | None) -> None:
+        self._size, self._loaded = size, pickle.dumps(function)
+        self._shared: Any = None
+        self._packed, self._version = b"", 0
         self._waiting: list[Task] = []
         self._workers: list[_Worker] = []
 
     def run(self, tasks: Sequence[Task], shared: Any) -> Generator[Outcome]:
-        self._run += 1
-        self._shared, self._waiting = pickle.dumps(shared), list(tasks)[::-1]
-        left = len(tasks)
+        if self._version == 0 or shared is not self._shared:
+            self._shared, self._packed, self._version = shared, pickle.dumps(shared), self._version + 1
+        self._waiting, left = list(tasks)[::-1], len(tasks)
         try:
-            self._hire(min(self._size, left) - len(self._workers))
+            self.hire(min(self._size, left) - len(self._workers))
             for worker in self._workers.copy():
                 self._hand_out(worker)
             while left:
@@ -84,12 +87,13 @@ class _Team(AbstractExecutor):
             if left:  # what still runs is of no use to the next run
                 self.dismiss()
 
-    def _hire(self, count: int) -> None:
+    def hire(self, count: int) -> None:
+        """Start workers."""
         context = multiprocessing.get_context("spawn")
         with environment(ONE_THREAD):
             for _ in range(count):
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(theirs,), daemon=True)
+                process = context.Process(target=_serve, args=(theirs, self._loaded), daemon=True)
                 process.start()
                 theirs.close()
                 self._workers.append(_Worker(process, ours))
@@ -115,11 +119,12 @@ class _Team(AbstractExecutor):
             return
         task = self._waiting.pop()
         try:
-            worker.connection.send_bytes(pickle.dumps((self._shared if worker.run != self._run else None, task)))
+            packed = self._packed if worker.version != self._version else None
+            worker.connection.send_bytes(pickle.dumps((packed, task)))
         except OSError:  # it died while it was idle: whoever takes its place takes the task
             self._waiting.append(task)
             return
-        worker.task, worker.run = task, self._run
+        worker.task, worker.version = task, self._version
 
     def _bury(self, worker: _Worker) -> Outcome | None:
         """Replace a worker that died; its task is lost."""
@@ -131,7 +136,7 @@ class _Team(AbstractExecutor):
             remedy = "a script that calls this needs `if __name__ == '__main__':`; or run with one worker"
             raise FrictionOcpError(Finding("execution", what, remedy=remedy))
         if self._waiting:
-            self._hire(1)
+            self.hire(1)
         if worker.task is None:
             return None
         return Outcome(worker.task.key, error=f"its process ended with code {code}", lost=True)
@@ -166,10 +171,14 @@ def environment(changes: dict[str, str]) -> Generator[None]:
                 os.environ[name] = value
 
 
-def _serve(connection: Connection) -> None:
-    """Work on tasks until the other end closes; Ctrl-C is for the parent to answer."""
+def _serve(connection: Connection, loaded: bytes) -> None:
+    """Work on tasks until the other end closes; Ctrl-C is for the parent to answer.
+
+    What is `loaded` is a function, for the modules that it needs.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    pickle.loads(loaded)
     shared: Any = None
     connection.send(None)
     while True:

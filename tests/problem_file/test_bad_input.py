@@ -403,6 +403,16 @@ def test_fault_of_a_recording_is_found(workshop: Workshop, name: str) -> None:
     assert f"problem.yaml: {place}: " in messages[0]
 
 
+def test_a_sign_is_wrong_in_all_recordings_or_not_at_all(workshop: Workshop) -> None:
+    """One recording against another is odd, and no reason to refuse the problem: its sign is that of the channel."""
+    workshop.recording("turned.h5", RECORDING_FAULTS["opposite sign"][0])
+    workshop.recording()
+    path = workshop.problem(put("recordings/train", ["sweep.h5", "turned.h5"]))
+    found = [item for item in check(load_problem(path)) if "opposite signs" in item.what]
+    assert [item.severity for item in found] == ["warning"]
+    assert "recordings.train[1]" in found[0].where and found[0].allowed == "they agree in other recordings"
+
+
 def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:
     """A recording that is no HDF5 file is refused at its place, with the command that makes one."""
     (workshop.folder / "sweep.h5").write_text("time,current\n0,1\n")

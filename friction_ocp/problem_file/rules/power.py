@@ -16,20 +16,21 @@ optimize: Any = _optimize  # its own types are incomplete
 _MOST_SAMPLES = 4000
 
 
-def contradicts(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Sequence[Motion] = ()) -> bool:
-    """Tell whether the work of `effort` (torque, force, current or voltage) fits only with its sign turned round.
+def sign_of_work(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Sequence[Motion] = ()) -> int:
+    """Return 1 where the work of `effort` (torque, force, current or voltage) fits only with the sign that it has.
 
-    The work is fitted by what a body takes up: kinetic energy, Coulomb and viscous losses, all with factors >= 0, and
-    the potential energy of the shafts whose motion is in `heavy`, with any factor.
+    -1 where it fits only with its sign turned round, 0 where neither is the case. The work is fitted by what a body
+    takes up: kinetic energy, Coulomb and viscous losses, all with factors >= 0, and the potential energy of the shafts
+    whose motion is in `heavy`, with any factor.
     """
     with np.errstate(all="ignore"):  # absurd values come out as not finite
-        return _contradicts(motion, time, effort, heavy)
+        return _sign_of_work(motion, time, effort, heavy)
 
 
-def _contradicts(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Sequence[Motion]) -> bool:
+def _sign_of_work(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Sequence[Motion]) -> int:
     present = np.isfinite(effort)
     if np.count_nonzero(present) < 5:
-        return False
+        return 0
     applied = np.interp(motion.time, time[present], effort[present])
     work = _integral(motion.time, applied * motion.omega)
     terms = [
@@ -43,7 +44,8 @@ def _contradicts(motion: Motion, time: FloatArray, effort: FloatArray, heavy: Se
     every = max(1, work.size // _MOST_SAMPLES)
     columns = np.column_stack(terms)[::every]
     straight, turned = (_misfit(columns, sign * work[::every]) for sign in (1.0, -1.0))
-    return turned < 0.5 * straight and turned < 0.5
+    best, other = min(straight, turned), max(straight, turned)
+    return 0 if best >= 0.5 or best >= 0.5 * other else (1 if straight < turned else -1)
 
 
 def _integral(time: FloatArray, rate: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from friction_ocp.estimation.problem import RecordingUse, StaticUse
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 from friction_ocp.problem_file.rules.clipping import channels_are_not_clipped
-from friction_ocp.problem_file.rules.power import contradicts
+from friction_ocp.problem_file.rules.power import sign_of_work
 from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.recording.checks import check_recording
 from friction_ocp.recording.recording import FloatArray
@@ -111,41 +111,42 @@ def current_and_motion_agree(case: Case) -> Iterator[Finding]:
         return
     motor = case.drive.motors[0]
     sign = float(np.sign(case.numbers.get(f"{motor.name}.torque_constant", 1.0)))
-    weights = [shaft.name for shaft in case.drive.shafts if shaft.gravity is not None]
-    for place, use in case.uses():
-        motion = case.motion(motor.shaft, use, rigidly=True)
-        heavy = [seen for name in weights if (seen := case.motion(name, use)) is not None]
-        for channel in case.drive.channels:
-            recorded = use.recording.channels.get(channel.name)
-            effort = channel.part == motor.name and channel.signal in ("current", "torque", "voltage")
-            if motion is None or recorded is None or not effort:
-                continue
-            gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
-            if gain and contradicts(motion, recorded.time, sign * (recorded.values - offset) / gain, heavy):
-                yield _opposite(case.at_recording(place, use), channel.name, motor.shaft)
-
-
-def _opposite(where: str, channel: str, shaft: str) -> Finding:
-    what = f"channel '{channel}' and the motion of shaft '{shaft}' have opposite signs"
-    allowed = "a positive torque accelerates in the positive direction"
-    return Finding(where, what, allowed, f"set the gain of '{channel}' to -1, or correct the sign of the position")
+    for channel in case.drive.channels:
+        if channel.part == motor.name and channel.signal in ("current", "torque", "voltage"):
+            yield from _turned_round(case, channel, motor.shaft, sign)
 
 
 def drive_torque_and_motion_agree(case: Case) -> Iterator[Finding]:
     """What moves a body with friction does work on it: it would not if a sign were wrong."""
-    weights = [shaft.name for shaft in case.drive.shafts if shaft.gravity is not None]
+    for channel in case.drive.outputs:
+        if channel.signal == DRIVE_TORQUE:
+            yield from _turned_round(case, channel, channel.part, 1.0)
+
+
+def _turned_round(case: Case, channel: Channel, shaft: str, sign: float) -> Iterator[Finding]:
+    """Yield the recordings in which an effort fits the motion of a shaft only with its sign turned round.
+
+    The sign is the same in all of them: where another recording fits only as it is, what is odd is that recording.
+    """
+    weights = [item.name for item in case.drive.shafts if item.gravity is not None]
+    gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
+    signs = dict[str, int]()
     for place, use in case.uses():
+        motion, recorded = case.motion(shaft, use, rigidly=True), use.recording.channels.get(channel.name)
+        if motion is None or recorded is None or not gain:
+            continue
         heavy = [seen for name in weights if (seen := case.motion(name, use)) is not None]
-        for channel in case.drive.outputs:
-            recorded = use.recording.channels.get(channel.name)
-            if channel.signal != DRIVE_TORQUE or recorded is None:
-                continue
-            motion = case.motion(channel.part, use, rigidly=True)
-            if motion is None:
-                continue
-            gain, offset = (case.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
-            if gain and contradicts(motion, recorded.time, (recorded.values - offset) / gain, heavy):
-                yield _opposite(case.at_recording(place, use), channel.name, channel.part)
+        effort = sign * (recorded.values - offset) / gain
+        signs[case.at_recording(place, use)] = sign_of_work(motion, recorded.time, effort, heavy)
+    fits_elsewhere = 1 in signs.values()
+    for where, found in signs.items():
+        if found < 0:
+            what = f"channel '{channel.name}' and the motion of shaft '{shaft}' have opposite signs"
+            allowed = "a positive torque accelerates in the positive direction"
+            remedy = f"set the gain of '{channel.name}' to -1, or correct the sign of the position"
+            if fits_elsewhere:
+                allowed, remedy = "they agree in other recordings", "look whether this one is what it says"
+            yield Finding(where, what, allowed, remedy, "warning" if fits_elsewhere else "error")
 
 
 NAMES: tuple[Rule, ...] = (recordings_have_names_of_their_own,)
