@@ -12,6 +12,7 @@ import pytest
 from problem_workshop import Workshop
 
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.problem_file.check import check
 from friction_ocp.problem_file.load import load_problem
 
 Content = dict[str, Any]
