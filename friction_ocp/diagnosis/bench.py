@@ -12,12 +12,14 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.easing import FAR, missed
 from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
+from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
@@ -27,6 +29,7 @@ from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.plain import plain, restored
@@ -85,6 +88,26 @@ class Bench:
         if self.seat.point is self.base_point or self.seat.point == self.base_point:
             return base
         return seated(with_drive(base.model, self.seat.drive), base.footing, self.seat.point)
+
+    @cached_property
+    def astray(self) -> bool:
+        """Whether the current model is so far off that the parameters that its fit has found say little."""
+        return FAR < missed(self.current.linear.program, self.current.linear.point) < np.inf
+
+    @cached_property
+    def unfitted(self) -> FittedModel | None:
+        """The current model at the guesses of its problem, and additions as they are: where to begin if it is astray.
+
+        None where that cannot be simulated.
+        """
+        current, stated = self.current, self.base.model.space
+        model, program = current.model, current.linear.program
+        guesses = dict(zip(stated.names, map(float, stated.guess), strict=True))
+        theta = model.space.clip(model.space.with_known(current.values | guesses))
+        point = settled(program, solve_nodes(program, Point(theta, program.suggested_nodes(theta))))
+        if not np.isfinite(program.objective(point)):
+            return None
+        return FittedModel(model, current.footing, linear_program(program, point))
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -200,16 +223,31 @@ class Crew:
         found = [self._screened(value) for value in values if value is not None]
         return sorted(found, key=lambda item: -item.gain)
 
-    def without(self, shortlist: Sequence[Screened]) -> tuple[FloatArray, list[Refit]]:
+    def screened_unfitted(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+        """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
+        tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
+        values = self._run("screening from the guesses", tasks, 0.25)
+        found = [self._screened(value) for value in values if value is not None]
+        return sorted(found, key=lambda item: -item.gain)
+
+    def without(
+        self, shortlist: Sequence[Screened], unfitted: Sequence[Screened] = ()
+    ) -> tuple[FloatArray, list[Refit]]:
         """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps.
 
-        Candidates whose simulation breaks down on the way are left out.
+        Those of `unfitted` begin at the guesses; of two refits of one candidate the better one counts. Candidates whose
+        simulation breaks down on the way are left out.
         """
         tasks = [Task(f"{self.number}-held-out", held_out_costs)]
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
+        tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]
         costs, *ends = self._run("refits", tasks, 0.5)
-        pairs = [(item, end) for item, end in zip(shortlist, ends, strict=True) if end is not None]
-        return restored(costs), [Refit(item, end["point"], restored(end["cost"])) for item, end in pairs]
+        best = dict[tuple[str, str], Refit]()
+        for item, end in zip([*shortlist, *unfitted], ends, strict=True):
+            cost = np.inf if end is None else float(restored(end["cost"]))
+            if end is not None and (item.key not in best or cost < best[item.key].cost):
+                best[item.key] = Refit(item, end["point"], cost)
+        return restored(costs), list(best.values())
 
     def rivals(self, tried: Sequence[Refit], without: FloatArray) -> list[Rival]:
         """Return candidates whose refits are completed, with what they gain on recordings left out."""
@@ -257,6 +295,16 @@ def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
     return None if seen is None else screened_document(seen)
 
 
+def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
+    """Test an effect at a place with all parameters at their guesses; null where that cannot be simulated."""
+    start = bench.unfitted
+    if start is None:
+        return None
+    blocks = blocks_of(start.linear.rows)
+    seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
+    return None if seen is None else screened_document(seen)
+
+
 def held_out_costs(bench: Bench) -> Json:
     """Return (blocks,) costs of the current model on recordings left out."""
     return plain(bench.blocks.sums(held_out(bench.current)))
@@ -264,7 +312,17 @@ def held_out_costs(bench: Bench) -> Json:
 
 def refit_candidate(bench: Bench, content: Json) -> Json:
     """Refit a candidate, a few steps; null where its simulation breaks down."""
-    fitted = quick_refit(bench.current, restored_screened(bench, content))
+    return _refitted(bench.current, restored_screened(bench, content))
+
+
+def refit_unfitted(bench: Bench, content: Json) -> Json:
+    """Refit a candidate from the guesses, a few steps; null where its simulation breaks down."""
+    assert bench.unfitted is not None
+    return _refitted(bench.unfitted, restored_screened(bench, content))
+
+
+def _refitted(start: FittedModel, item: Screened) -> Json:
+    fitted = quick_refit(start, item)
     return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
 
 

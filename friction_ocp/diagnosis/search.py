@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,6 +31,9 @@ MOST_ROUNDS = 4
 FINISHED, CLOSE = 2, 1.5
 """Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
 this factor."""
+BEGUN, MOST_ALIKE = 4, 0.5
+"""Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
+has moved far to stand in for what is missing hide what it is."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -143,14 +146,17 @@ class Search:
         current, blocks, level = bench.current, bench.blocks, self.level
         enough = required(bench.base, current) if meant.names else np.inf
         again = shapes(current, bench.clues, accepted)
-        found = crew.screened([*places(current, meant), *again])
+        keys = [*places(current, meant), *again]
+        found = crew.screened(keys)
         power = excess(current.linear.rows, blocks)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
         gap = power.significant(level)
         chosen = with_resembling(shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found)
+        known = {item.key: item for item in found}
+        unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and bench.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
-        for rivals in _completed(crew, chosen):
+        for rivals in _completed(crew, chosen, unfitted, known):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)
@@ -162,14 +168,22 @@ class Search:
         return Round(tuple(found), choice, current, power, best)
 
 
-def _completed(crew: Crew, chosen: Sequence[Screened]) -> Iterator[list[Rival]]:
+def _promising(found: Sequence[Screened]) -> list[Screened]:
+    """Return the few candidates that promise most where all parameters are at their guesses."""
+    return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
+
+
+def _completed(
+    crew: Crew, chosen: Sequence[Screened], unfitted: Sequence[Screened], known: Mapping[Key, Screened]
+) -> Iterator[list[Rival]]:
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
     What fits best where it was fitted may be worth nothing on recordings left out.
     """
     if not chosen:
         return
-    without, refits = crew.without(chosen)
+    without, tried = crew.without(chosen, unfitted)
+    refits = [replace(refit, screened=known[refit.key]) for refit in tried]
     if not refits:
         return
     current = crew.bench.current
