@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.easing import FAR, missed
-from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, completed, fit_base, nudged, quick_refit
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
@@ -42,6 +42,8 @@ from friction_ocp.statistics.workshop import Workshop
 
 Tell = Callable[[str, float], None]
 """Called with what is being done and the share of a round that is done."""
+NUDGES, MOST_TURNS = 4, 3
+"""Fits from parameters changed by chance at a time, and how often they may go on from a better one."""
 LOSSES = (Absolute, Huber, Squares, StudentT)
 
 
@@ -180,11 +182,41 @@ def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> Fl
 
 
 def open_bench(problem: Problem, execution: Execution) -> Bench:
-    """Fit the base model in this process, or read its end from the output folder."""
+    """Fit the base model in this process, or read its end from the output folder; then try to better it."""
     workshop, task = Workshop(problem), Task("base", fit_base_model)
     with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
     found = _value(with_one["base"])
-    return Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    better = bettered(bench, execution)
+    return replace(better, base_point=better.seat.point)
+
+
+def bettered(bench: Bench, execution: Execution) -> Bench:
+    """Return the bench of the current model where it fits better, found from parameters that chance has changed.
+
+    Tries go on from the best one as long as they better it.
+    """
+    best, known = None, bench.current.objective
+    if not bench.current.theta.size:
+        return bench
+    for turn in range(MOST_TURNS):
+        tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]
+        shared = bench.fingerprint
+        outcomes = run_tasks("looking for a better fit", tasks, bench, shared, execution.executor, execution.ledger)
+        ends = [value for value in map(_value, outcomes.values()) if value is not None]
+        end = min(ends, key=lambda value: restored(value["objective"]), default=None)
+        if end is None or restored(end["objective"]) >= known - UNIMPORTANT:
+            break
+        best, known = end["point"], restored(end["objective"])
+    return bench if best is None else replace(bench, seat=Seat(bench.seat.drive, best))
+
+
+def nudge(bench: Bench, point: Json, seed: int) -> Json:
+    """Fit the current model again from beside a point, its own if that is null; null where that breaks down."""
+    current = bench.current
+    start = current if point is None else seated(current.model, current.footing, point)
+    fitted = nudged(start, bench.problem.estimation.seed + seed)
+    return {"point": point_document(fitted), "objective": plain(fitted.objective)} if fitted.holds else None
 
 
 def fit_base_model(workshop: Workshop) -> Json:

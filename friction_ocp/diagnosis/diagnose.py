@@ -154,9 +154,10 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     level, meant = level_of(problem), considered(problem)
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
-        bench = open_bench(problem, execution)
+        run = replace(execution, executor=executor)
+        bench = open_bench(problem, run)
         base = bench.base
-        search = Search(bench, replace(execution, executor=executor), meant, level, tell)
+        search = Search(bench, run, meant, level, tell)
         search.go()
     rounds, accepted = search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)

@@ -43,6 +43,8 @@ MOST_TURNS = 8
 STEPS_OF_NODES = 3
 MOST_OF = 0.5
 """Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
+NUDGE = 0.05
+"""Relative change of the parameters from which a fit begins again."""
 UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
 
@@ -286,6 +288,17 @@ def unstuck(model: Model, program: Program, point: Point) -> Point:
         if after < cost - UNIMPORTANT:
             best, cost = trial, after
     return best
+
+
+def nudged(fitted: FittedModel, seed: int) -> FittedModel:
+    """Fit again from parameters that chance has changed a little.
+
+    Exact friction has kinks, and between them many ends: an answer that is not the best one leaves a torque that no
+    effect explains.
+    """
+    rng = np.random.default_rng(seed)
+    theta = fitted.theta * (1.0 + NUDGE * rng.standard_normal(fitted.theta.size))
+    return polished(fitted.model, fitted.footing, theta, None)
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Bench, Crew, Tell
+from friction_ocp.diagnosis.bench import Bench, Crew, Tell, bettered
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.free_gap import free_errors, shrink
 from friction_ocp.diagnosis.held_out import folds
@@ -21,6 +21,7 @@ from friction_ocp.diagnosis.worth import (
     gain,
     innovations,
     required,
+    samples,
     shapes,
     shortlist,
     with_resembling,
@@ -34,6 +35,8 @@ this factor."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is."""
+NOTABLE = 0.05
+"""Share of what is left by which another fit of the same model must be better to look for effects anew."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -61,7 +64,7 @@ class Search:
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
-                done = self._from_alias() or done
+                done = self._from_better() or self._from_alias() or done
             self.rounds.append(done)
             if done.accepted is None:
                 break
@@ -71,6 +74,17 @@ class Search:
                 break
         if self.accepted and not self._helps():
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
+
+    def _from_better(self) -> Round | None:
+        """Go on from a better fit of what was accepted, if there is one: what is left may be no more than that."""
+        if not self.accepted:
+            return None
+        known, better = self.bench.current, bettered(self.bench, self.run)
+        notable = NOTABLE * (known.objective - 0.5 * samples(known))
+        if better is self.bench or known.objective - better.current.objective < notable:
+            return None
+        self.bench = self.bench.at(better.current)
+        return self._round(self.bench, self.accepted, self.meant)
 
     def _from_alias(self) -> Round | None:
         """Go on from what the recordings could not tell from the last addition, where that itself leads nowhere.
