@@ -194,10 +194,11 @@ def open_bench(problem: Problem, execution: Execution) -> Bench:
 def bettered(bench: Bench, execution: Execution) -> Bench:
     """Return the bench of the current model where it fits better, found from parameters that chance has changed.
 
-    Tries go on from the best one as long as they better it.
+    Tries go on from the best one as long as they better it. There are none where much is missed: where a model that
+    lacks something large ends says little.
     """
     best, known = None, bench.current.objective
-    if not bench.current.theta.size:
+    if bench.astray or not bench.current.theta.size:
         return bench
     for turn in range(MOST_TURNS):
         tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]

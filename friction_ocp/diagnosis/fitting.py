@@ -43,8 +43,9 @@ MOST_TURNS = 8
 STEPS_OF_NODES = 3
 MOST_OF = 0.5
 """Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
-NUDGE = 0.05
-"""Relative change of the parameters from which a fit begins again."""
+NUDGE, CLOSE_BY = 0.05, 1.2
+"""Relative change of the parameters from which a fit begins again, and its objective after a few steps over the known
+one up to which it goes on."""
 UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
 
@@ -298,7 +299,10 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     """
     rng = np.random.default_rng(seed)
     theta = fitted.theta * (1.0 + NUDGE * rng.standard_normal(fitted.theta.size))
-    return polished(fitted.model, fitted.footing, theta, None)
+    end = polished(fitted.model, fitted.footing, theta, None, QUICK)
+    if not end.objective < CLOSE_BY * fitted.objective:
+        return end
+    return polished(end.model, end.footing, end.theta, end.linear.point.nodes)
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:

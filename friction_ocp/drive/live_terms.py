@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
-from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.drive.parts import SHARPNESS, Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.parameters import Value, is_off
 
 
@@ -54,12 +54,14 @@ def _transmission(item: Transmission) -> Transmission:
 
 
 def _motor(motor: Motor) -> Motor:
+    plain = is_off(motor.saturation) or motor.saturation_sharpness == SHARPNESS
     return replace(
         motor,
         cogging=_live(motor.cogging),
         torque_ripple=_live(motor.torque_ripple),
         lag=_on(motor.lag),
         saturation=_on(motor.saturation),
+        saturation_sharpness=None if plain else motor.saturation_sharpness,
     )
 
 

@@ -9,7 +9,7 @@ import casadi as ca
 from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, saturate
 from friction_ocp.drive.mechanism import FEEDBACK_DELAY, Mechanism, Motion, column
 from friction_ocp.drive.parts import Controller, Motor
-from friction_ocp.friction.smoothing import sqrt, where
+from friction_ocp.friction.smoothing import power, sqrt, where
 
 
 def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -24,7 +24,12 @@ def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
 
 
 def _saturated(motor: Motor, torque: Any, current: Any) -> Any:
-    return torque if motor.saturation is None else torque / sqrt(1.0 + motor.saturation * current**2)
+    if motor.saturation is None:
+        return torque
+    used, sharpness = motor.saturation * current**2, motor.saturation_sharpness
+    if sharpness is None:
+        return torque / sqrt(1.0 + used)
+    return torque / power(1.0 + power(used, 0.5 * sharpness), 1.0 / sharpness)
 
 
 def torque_ripple_factor(mech: Mechanism, motor: Motor, motion: Motion) -> Any:

@@ -154,13 +154,17 @@ class Transmission:
         return self.stiffness is None
 
 
+SHARPNESS = 2.0
+"""Of saturation that grows with the square of the current."""
+
+
 @dataclass(frozen=True)
 class Motor:
     """An electric motor on a shaft; its back-EMF constant equals its torque constant.
 
-    What drives it (current, torque or voltage) follows its command with the time constant `lag`; of the torque that a
-    current i would make, sqrt(1 + saturation i^2) makes the share that is left, i being the torque over the torque
-    constant where torque drives it.
+    What drives it (current, torque or voltage) follows its command with the time constant `lag`. The torque that a
+    current i would make is divided by (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the
+    torque over the torque constant where torque drives it.
     """
 
     name: str
@@ -172,7 +176,8 @@ class Motor:
     cogging: Cogging | None = None
     torque_ripple: TorqueRipple | None = None
     lag: Value = quantity("time", "time constant with which the motor follows its command", 0.0)
-    saturation: Value = quantity("saturation", "1 / I^2 of the current I at which the torque has fallen to 71 %", 0.0)
+    saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
+    saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from friction_ocp.drive.parts import Drive, Motor
+from friction_ocp.drive.parts import SHARPNESS, Drive, Motor
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_motor, motor_of, upwards
 from friction_ocp.parameters import Free, is_off
 
@@ -51,3 +51,12 @@ class TorqueSaturationEffect(AbstractEffect):
         size, path = 0.2 / current**2, f"{motor.name}.saturation"
         added = change_motor(drive, motor.name, saturation=upwards(size))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive whose torque ceases to rise more suddenly, or less."""
+        motor = motor_of(drive, place)
+        if motor is None or is_off(motor.saturation) or motor.saturation_sharpness != SHARPNESS:
+            return None
+        path = f"{motor.name}.saturation_sharpness"
+        added = change_motor(drive, motor.name, saturation_sharpness=Free(SHARPNESS, 1.0, 20.0))
+        return Augmentation(added, {path: SHARPNESS}, (Trial(({path: 1.1 * SHARPNESS},)),))

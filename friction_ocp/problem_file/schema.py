@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PlainValidator, model_validator
 
 from friction_ocp.drive.parts import (
+    SHARPNESS,
     Channel,
     Clock,
     Controller,
@@ -111,6 +112,7 @@ class MotorSection(Section):
     torque_ripple: TorqueRippleTerm = None
     lag: Number = 0.0
     saturation: Number = 0.0
+    saturation_sharpness: Number = SHARPNESS
 
     def build(self, first_shaft: str) -> Motor:
         stated = given(self, *(key for key in self.keys() if key not in ("name", "shaft")))

@@ -51,6 +51,7 @@ PLANTS: dict[str, Plant] = {
     "warm-up": pair(replace(SHAFT, warm_up=PlantWarmUp(0.8, -0.4, -0.4))),
     "lag": pair(motor=replace(MOTOR, amplifier=PlantAmplifier(time_constant=0.02))),
     "saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 2.0))),
+    "sharp saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 4.0))),
     "stiffening": pair(joint=replace(JOINT, cubic=3e5)),
     "hysteresis": pair(joint=replace(JOINT, loop=PlantLoop(((1.0, 0.003),), smooth=True))),
     "kinematic error": pair(joint=replace(JOINT, kinematic_error=PlantRipple(0.7, 0.003, 0.004))),

@@ -140,7 +140,7 @@ def _transmission(item: PlantTransmission) -> Transmission:
 
 def _motor(motor: PlantMotor) -> Motor:
     voltage, saturation = motor.drive == "voltage", motor.saturation
-    assert saturation is None or (saturation.form, saturation.sharpness) == ("algebraic", 2.0)
+    assert saturation is None or saturation.form == "algebraic"
     return Motor(
         motor.name,
         motor.shaft,
@@ -152,6 +152,7 @@ def _motor(motor: PlantMotor) -> Motor:
         _wave(TorqueRipple, motor.torque_ripple),
         0.0 if motor.amplifier is None else motor.amplifier.time_constant,
         0.0 if saturation is None else saturation.current**-2.0,
+        2.0 if saturation is None else saturation.sharpness,
     )
 
 
