@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cases import COULOMB, TORQUE_CONSTANT, axis, write_case
-from plant import Plant, PlantRipple
+from plant import Plant, PlantRipple, PlantSaturation
 
 from friction_ocp.cli import main
 from friction_ocp.drive.parts import (
@@ -54,6 +54,7 @@ SHAPES: dict[str, tuple[Drive, str]] = {
     "torque_ripple": (geared(torque_ripple=TorqueRipple(0.1, 0.2, 0.7)), "motor"),
     "periodic_disturbance": (geared(wave=Disturbance(0.1, 0.05, 0.3)), "motor"),
     "kinematic_error": (geared(), "motor-load"),
+    "torque_saturation": (geared(saturation=0.5), "motor"),
 }
 """A drive that has the effect already, and where."""
 COSINES, SINES = (0.03, 0.0, 0.006), (0.0, -0.012, 0.0)
@@ -132,3 +133,14 @@ def test_overtones_belong_to_their_wave(tmp_path: Path) -> None:
     sizes = [np.hypot(found[f"{order}cosine"], found[f"{order}sine"]) for order in ("", "second_", "third_")]
     assert sizes == pytest.approx(np.hypot(COSINES, SINES), rel=0.1)
     assert max(sizes) < TORQUE_CONSTANT
+
+
+@pytest.mark.slow
+def test_the_sharpness_of_saturation_is_found(tmp_path: Path) -> None:
+    """A motor whose torque ceases to rise suddenly saturates all the same."""
+    plain, limit, sharpness = axis(), 2.5, 4.0
+    iron = PlantSaturation(limit, "algebraic", sharpness)
+    plant = replace(plain, motors=(replace(plain.motors[0], saturation=iron),))
+    found = values_of(diagnosed(tmp_path, plant, ["torque_saturation", "quadratic_drag"]))
+    assert found["saturation"] == pytest.approx(limit**-2.0, rel=0.05)
+    assert found["saturation_sharpness"] == pytest.approx(sharpness, rel=0.1)
