@@ -18,9 +18,9 @@ def batches(line: str, quick: bool) -> Check:
     return fleet.check(line, 4, 8) if quick else fleet.check(line)
 
 
-def clusters(line: str, quick: bool) -> Check:
+def clusters(line: str, _quick: bool) -> Check:
     """Run the tests with a real scheduler, and time a diagnosis in one process and in two."""
-    sooner = jobs.check(line, 4.0 if quick else jobs.SECONDS)
+    sooner = jobs.check(line)
     test = "tests/execution/test_cluster.py"
     command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", test]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
