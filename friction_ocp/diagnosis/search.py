@@ -9,9 +9,11 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, Crew, Tell, bettered
 from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, without_addition
 from friction_ocp.diagnosis.free_gap import free_errors, shrink
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.options import NONE, Considered, places
+from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
@@ -64,7 +66,7 @@ class Search:
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
-                done = self._from_better() or self._from_alias() or done
+                done = self._from_better() or self._from_alias() or self._reopened() or done
             self.rounds.append(done)
             if done.accepted is None:
                 break
@@ -103,6 +105,29 @@ class Search:
             if done.accepted is not None:
                 self.rounds[-1] = put_first(last, rival)
                 self.bench, self.accepted = bench, keys
+                return done
+        return None
+
+    def _reopened(self) -> Round | None:
+        """Take the place of an earlier addition up again where others, beside the later ones, lead further.
+
+        Of two effects that are missing the first addition is what comes nearest to both, be it neither; what is one of
+        them may not have been worth a refit then.
+        """
+        base, current = self.bench.base, self.bench.current
+        for index, item in enumerate(self.rounds[:-1]):
+            held = item.accepted
+            if held is None or self.accepted.count(held.key) != 1:
+                continue
+            kept = [key for key in self.accepted if key != held.key]
+            simpler = without_addition(current, with_additions(base, kept))
+            if not simpler.holds:
+                continue
+            bench = self.bench.at(simpler)
+            done = self._round(bench, kept, self.meant)
+            if done.accepted is not None and done.accepted.standing.cost < current.cost - UNIMPORTANT:
+                self.bench, self.accepted = bench, kept
+                self.rounds.pop(index)
                 return done
         return None
 
