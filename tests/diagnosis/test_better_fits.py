@@ -1,0 +1,65 @@
+"""Fits that begin elsewhere: from parameters changed a little, and from the guesses where a fit is astray."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from diagnosis_cases import axis, write_case
+
+from friction_ocp.diagnosis.bench import Bench, Seat, bettered, open_bench
+from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.easing import FAR, missed
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel
+from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.model import with_drive
+from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.score import solve_nodes
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.statistics.execution import Execution
+
+HERE = Execution(InProcess())
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """Return the bench of a model that lacks nothing."""
+    return open_bench(load_problem(write_case(tmp_path_factory.mktemp("better"), axis())), HERE)
+
+
+def moved(bench: Bench, factor: float) -> Bench:
+    """Return the bench at parameters that no fit has led to."""
+    fitted = bench.current
+    program = fitted.linear.program
+    point = solve_nodes(program, Point(factor * fitted.theta, fitted.linear.point.nodes))
+    return bench.at(FittedModel(fitted.model, fitted.footing, linear_program(program, point)))
+
+
+def test_a_fit_that_is_not_the_best_is_bettered(bench: Bench) -> None:
+    """From beside the optimum it is found; the optimum itself stays as it is."""
+    beside = moved(bench, 1.01)
+    assert beside.current.objective > bench.current.objective + 10.0 * UNIMPORTANT
+    assert bettered(beside, HERE).current.objective == pytest.approx(bench.current.objective, abs=UNIMPORTANT)
+    assert bettered(bench, HERE) is bench
+
+
+def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
+    """Where much is missed no better end is looked for; candidates begin at the guesses, additions staying as they are."""
+    far = moved(bench, 2.0)
+    program = far.current.linear.program
+    assert missed(program, far.current.linear.point) > FAR and far.astray and not bench.astray
+    assert bettered(far, HERE) is far
+
+    added = effects()["unbalance"].addition(bench.problem.drive, "motor", clues_of(bench.current)).drive
+    model = with_drive(bench.base.model, added)
+    known = {"motor.gravity.torque": 0.012, "motor.gravity.phase": 0.4}
+    theta = model.space.with_known({name: 1.3 * value for name, value in bench.current.values.items()} | known)
+    program = bench.base.footing.training(model)
+    at = Point(theta, program.suggested_nodes(theta))
+    seat = Seat.of(FittedModel(model, bench.base.footing, linear_program(program, at)))
+    begun = replace(bench, seat=Seat(added, seat.point)).unfitted
+    assert begun is not None
+    space = bench.base.model.space
+    assert begun.values == pytest.approx(dict(zip(space.names, space.guess, strict=True)) | known)
