@@ -46,7 +46,7 @@ def test_a_fit_that_is_not_the_best_is_bettered(bench: Bench) -> None:
 
 
 def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
-    """Where much is missed no better end is looked for; candidates begin at the guesses, additions staying as they are."""
+    """Where much is missed no better end is looked for; candidates begin at the guesses, with additions as they are."""
     far = moved(bench, 2.0)
     program = far.current.linear.program
     assert missed(program, far.current.linear.point) > FAR and far.astray and not bench.astray
