@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Round, choose, put_first, shown, with_refused, withdrawn
+from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.worth import (
     Key,
     gain,
@@ -103,7 +103,7 @@ class Search:
             bench, keys = self.bench.at(rival.fitted), [*before, rival.key]
             done = self._round(bench, keys, self.meant)
             if done.accepted is not None:
-                self.rounds[-1] = put_first(last, rival)
+                self.rounds[-1] = replace(last, choice=with_first(last.choice, rival), accepted=rival)
                 self.bench, self.accepted = bench, keys
                 return done
         return None

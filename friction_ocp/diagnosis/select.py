@@ -81,7 +81,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
     parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), and its distance from
-    stated values what their priors say; rivals that leave the same residuals share what they have.
+    stated values what their priors say; rivals that leave the same residuals share what they have. Of an effect and one
+    that has all of it and more, the plain one comes first as long as it is not excluded.
     """
     if not rivals:
         return NOTHING
@@ -96,7 +97,7 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     sure = needed([chances[k] for k in order])
     aliases = [rival for k, rival in enumerate(ordered[:sure]) if k == 0 or float(np.sum(rival.gains)) > 0]
     some = bool(shares[0] < level / len(rivals))
-    return Choice(
+    found = Choice(
         rivals=tuple(ordered),
         probabilities=tuple(chances[k] for k in order),
         nothing=float(shares[0]),
@@ -104,6 +105,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
         aliases=tuple(aliases),
         same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
     )
+    special = next((rival for rival in aliases[1:] if ordered[0].screened.holds(rival.screened)), None)
+    return found if special is None else with_first(found, special)
 
 
 def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:
@@ -128,11 +131,11 @@ def turned(choice: Choice, rival: Rival) -> Choice:
     return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=(rival,))
 
 
-def put_first(item: Round, rival: Rival) -> Round:
-    """Return a round that has accepted another rival of its alias set, which excludes none of the others."""
-    aliases = (rival, *(other for other in item.choice.aliases if other is not rival))
-    same = (rival, *(other for other in item.choice.rivals if other is not rival and is_same(other, rival)))
-    return replace(item, choice=replace(turned(item.choice, rival), aliases=aliases, same=same), accepted=rival)
+def with_first(choice: Choice, rival: Rival) -> Choice:
+    """Return a choice with another rival of its alias set in the place of the best; none of them is excluded."""
+    aliases = (rival, *(other for other in choice.aliases if other is not rival))
+    same = (rival, *(other for other in choice.rivals if other is not rival and is_same(other, rival)))
+    return replace(turned(choice, rival), aliases=aliases, same=same)
 
 
 def price(blocks: Blocks, parts: int) -> float:

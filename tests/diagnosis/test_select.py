@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -11,7 +12,7 @@ import pytest
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Choice, Round, choose, put_first, shown
+from friction_ocp.diagnosis.select import Choice, choose, shown, with_first
 from friction_ocp.effects.effect import Augmentation
 
 COUNT = 60
@@ -70,9 +71,19 @@ def test_another_of_an_alias_set_can_be_accepted() -> None:
     one, other = rival("stribeck", "motor", {"a": 0.0}, gain=5.0), rival("cogging", "motor", {"b": 0.0}, gain=2.0)
     alike = rival("unbalance", "motor", {"c": 0.0}, gain=2.0)
     choice = Choice((one, other, alike), (0.5, 0.3, 0.2), 0.0, True, (one, other, alike), (one,))
-    moved = put_first(Round((), choice, cast(Any, None), cast(Any, None), one), other)
-    assert moved.accepted is other
-    assert moved.choice.aliases == (other, one, alike)
-    assert moved.choice.same == (other, alike)
-    assert moved.choice.rivals == (other, one, alike)
-    assert moved.choice.probabilities == (0.5, 0.3, 0.2)
+    moved = with_first(choice, other)
+    assert moved.aliases == (other, one, alike)
+    assert moved.same == (other, alike)
+    assert moved.rivals == (other, one, alike)
+    assert moved.probabilities == (0.5, 0.3, 0.2)
+
+
+def test_a_special_case_comes_before_what_contains_it() -> None:
+    """As long as the recordings do not exclude it: more parameters that gain a little are no other effect."""
+    zero = rival("sensor_offset", "motor_position", {"motor_position.offset": 0.0}, gain=5.0)
+    disc = rival("sensor_eccentricity", "motor_position", {"motor_position.offset": 0.0, "wave": 0.0}, gain=3.0)
+    disc = replace(disc, gains=zero.gains + 0.03)
+    found = chosen(disc, zero)
+    assert found.aliases == (zero, disc) and found.rivals[0] is zero
+    assert found.probabilities[0] > found.probabilities[1] > 0.0
+    assert chosen(replace(disc, gains=disc.gains + 1.0), zero).aliases[0].key == disc.key
