@@ -12,14 +12,12 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.easing import FAR, missed
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, completed, fit_base, nudged, quick_refit
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, begun, completed, fit_base, nudged, quick_refit
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
-from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
@@ -29,7 +27,6 @@ from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.plain import plain, restored
@@ -92,11 +89,6 @@ class Bench:
         return seated(with_drive(base.model, self.seat.drive), base.footing, self.seat.point)
 
     @cached_property
-    def astray(self) -> bool:
-        """Whether the current model is so far off that the parameters that its fit has found say little."""
-        return FAR < missed(self.current.linear.program, self.current.linear.point) < np.inf
-
-    @cached_property
     def unfitted(self) -> FittedModel | None:
         """The current model at the guesses of its problem, and additions as they are: where to begin if it is astray.
 
@@ -106,7 +98,7 @@ class Bench:
         model, program = current.model, current.linear.program
         guesses = dict(zip(stated.names, map(float, stated.guess), strict=True))
         theta = model.space.clip(model.space.with_known(current.values | guesses))
-        point = settled(program, solve_nodes(program, Point(theta, program.suggested_nodes(theta))))
+        point = begun(program, theta)
         if not np.isfinite(program.objective(point)):
             return None
         return FittedModel(model, current.footing, linear_program(program, point))
@@ -115,6 +107,12 @@ class Bench:
     def blocks(self) -> Blocks:
         """Blocks of the residuals of the current model."""
         return blocks_of(self.current.linear.rows)
+
+    @cached_property
+    def unfitted_blocks(self) -> Blocks:
+        """Blocks of the residuals at the guesses."""
+        assert self.unfitted is not None
+        return blocks_of(self.unfitted.linear.rows)
 
     @cached_property
     def clues(self) -> Clues:
@@ -198,7 +196,7 @@ def bettered(bench: Bench, execution: Execution) -> Bench:
     lacks something large ends says little.
     """
     best, known = None, bench.current.objective
-    if bench.astray or not bench.current.theta.size:
+    if bench.current.astray or not bench.current.theta.size:
         return bench
     for turn in range(MOST_TURNS):
         tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]
@@ -252,15 +250,15 @@ class Crew:
     def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
         """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
         tasks = [self._task("screen", key, screen_candidate, key) for key in candidates]
-        values = self._run("screening", tasks, 0.0)
-        found = [self._screened(value) for value in values if value is not None]
-        return sorted(found, key=lambda item: -item.gain)
+        return self._tested("screening", tasks, 0.0)
 
     def screened_unfitted(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
         """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
         tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
-        values = self._run("screening from the guesses", tasks, 0.25)
-        found = [self._screened(value) for value in values if value is not None]
+        return self._tested("screening from the guesses", tasks, 0.25)
+
+    def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
+        found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
         return sorted(found, key=lambda item: -item.gain)
 
     def without(
@@ -310,9 +308,6 @@ class Crew:
         outcomes = run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch)
         return [_value(outcome) for outcome in outcomes.values()]
 
-    def _screened(self, content: Json) -> Screened:
-        return restored_screened(self.bench, content)
-
 
 def _value(outcome: Outcome) -> Json:
     if outcome.error:
@@ -323,17 +318,16 @@ def _value(outcome: Outcome) -> Json:
 
 def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place; null where the drive with it cannot be simulated."""
-    current = bench.current
-    seen = screen(current.model, current.linear, bench.blocks, effects()[effect], place, bench.clues)
-    return None if seen is None else screened_document(seen)
+    return _tested(bench, bench.current, bench.blocks, effect, place)
 
 
 def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place with all parameters at their guesses; null where that cannot be simulated."""
     start = bench.unfitted
-    if start is None:
-        return None
-    blocks = blocks_of(start.linear.rows)
+    return None if start is None else _tested(bench, start, bench.unfitted_blocks, effect, place)
+
+
+def _tested(bench: Bench, start: FittedModel, blocks: Blocks, effect: str, place: str) -> Json:
     seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
     return None if seen is None else screened_document(seen)
 

@@ -84,6 +84,16 @@ class FittedModel:
         """Whether the simulation does not break down."""
         return bool(np.isfinite(self.objective))
 
+    @property
+    def missed(self) -> float:
+        """The power of the residuals over that of noise."""
+        return missed(self.linear.program, self.linear.point)
+
+    @property
+    def astray(self) -> bool:
+        """Whether something so large is missing that the parameters that the fit has found say little."""
+        return FAR < self.missed < np.inf
+
     @cached_property
     def cost(self) -> float:
         """The same with the noise that this model's own inertia would show: what models are compared by."""
@@ -133,10 +143,9 @@ def _fitted_base(model: Model) -> FittedModel:
 
 def _from_afar(fitted: FittedModel, starts: Sequence[FloatArray]) -> FittedModel:
     """Fit again through wide gaps from some starts where the fit has missed much, on finer segments where needed."""
-    program, point = fitted.linear.program, fitted.linear.point
-    factor = missed(program, point)
-    if not FAR < factor < np.inf:
+    if not fitted.astray:
         return fitted
+    program, point, factor = fitted.linear.program, fitted.linear.point, fitted.missed
     foot, wide = finer(fitted.model, fitted.footing, starts, factor)
     finely = foot.training(fitted.model)
     begins = [along(finely, program, point), eased(finely, wide, factor)]
@@ -187,13 +196,16 @@ def polished(
     """Minimise the likelihood on the footing from a start."""
     program = foot.training(model)
     theta = model.space.clip(theta)
-    point = Point(theta, program.suggested_nodes(theta) if nodes is None else nodes)
-    if nodes is None:
-        point = settled(program, solve_nodes(program, point))
+    point = begun(program, theta) if nodes is None else Point(theta, nodes)
     if not theta.size:
         return FittedModel(model, foot, linear_program(program, solve_nodes(program, point)))
     end = solve_gauss_newton(program, point, limits)
     return FittedModel(model, foot, linear_program(program, end.point))
+
+
+def begun(program: Program, theta: FloatArray) -> Point:
+    """Return parameters with the nodes that fit them best."""
+    return settled(program, solve_nodes(program, Point(theta, program.suggested_nodes(theta))))
 
 
 def timed(fitted: FittedModel, limits: Tolerances = WARM) -> FittedModel:
@@ -218,13 +230,13 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     program = base.footing.training(model)
     points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
     ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
-    factor, best = missed(base.linear.program, base.linear.point), min(end.objective for end in ends)
-    if base.footing.segment_s is not None and FAR < factor < np.inf and base.objective - best < item.gain:
+    best = min(end.objective for end in ends)
+    if base.astray and base.footing.segment_s is not None and base.objective - best < item.gain:
         away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
-        far = [_steps(base, model, program, eased(program, point, factor)) for point in away]
+        far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]
     large, best = item.augmentation.large, min(end.objective for end in ends)
-    if large is not None and FAR < factor < np.inf and base.objective - best < MOST_OF * base.objective:
+    if base.astray and large is not None and base.objective - best < MOST_OF * base.objective:
         tried = [large(start.added(item.augmentation.off)) for start in item.starts]
         ends += [
             _steps(base, model, program, _point(base, model, built, {**base.values, **values})) for values in tried

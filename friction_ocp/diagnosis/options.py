@@ -47,6 +47,11 @@ class Considered:
         components = self.only[effect]
         return components is None or component in components
 
+    def candidates(self, drive: Drive) -> list[Key]:
+        """Return what competes in a drive."""
+        found = [(effect.name, place) for effect, place in candidates(drive, self.names)]
+        return [key for key in found if self.holds(*key)]
+
 
 NONE = Considered({})
 """Nothing competes."""
@@ -87,12 +92,11 @@ def considered(problem: Problem) -> Considered:
 def places(current: FittedModel, meant: Considered) -> list[Key]:
     """Return what competes; static points also show friction of shafts whose motion an input prescribes."""
     drive = current.model.problem.drive
-    found = [(effect.name, place) for effect, place in candidates(drive, meant.names)]
+    found = meant.candidates(drive)
     driven = drive.prescribed
     if current.model.static and driven:
-        free = candidates(_released(drive), meant.names)
-        found += [(effect.name, place) for effect, place in free if place in driven]
-    return [key for key in dict.fromkeys(found) if meant.holds(*key)]
+        found += [key for key in meant.candidates(_released(drive)) if key[1] in driven]
+    return list(dict.fromkeys(found))
 
 
 def _released(drive: Drive) -> Drive:

@@ -39,6 +39,8 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
+MINOR = 0.5
+"""Share of what was not noise below which what is left of it is the smaller part."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -169,7 +171,7 @@ class Search:
         """
         base, current = self.bench.base, self.bench.current
         left = innovations(current)
-        if not left.significant(self.level) or left.beyond < 0.5 * innovations(base).beyond:
+        if not left.significant(self.level) or left.beyond < MINOR * innovations(base).beyond:
             return True
         before, after = (free_errors(fitted, held_out=True) for fitted in (base, current))
         return before.lost or shrink(before, after, self.bench.problem.estimation.seed).interval95[0] > 0.0
@@ -192,7 +194,7 @@ class Search:
         gap = power.significant(level)
         chosen = with_resembling(shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found)
         known = {item.key: item for item in found}
-        unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and bench.astray else []
+        unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         for rivals in _completed(crew, chosen, unfitted, known):

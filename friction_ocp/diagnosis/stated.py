@@ -21,7 +21,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.effects.effect import Augmentation
-from friction_ocp.effects.registry import candidates
+from friction_ocp.effects.registry import effects
 from friction_ocp.effects.torques import mode_of
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.parameters import Free
@@ -153,10 +153,10 @@ def _freed(
     clues, model = clues_of(current), current.model
     stated = dict(zip(model.space.names, map(float, model.space.prior_mean), strict=True))
     wanted = current.values | {name: stated[name] for item in found for name in item.names}
-    for effect, place in candidates(model.problem.drive, [name for name in meant.names if name in STATED]):
-        if not meant.holds(effect.name, place):
+    for effect, place in meant.candidates(model.problem.drive):
+        if effect not in STATED:
             continue
-        seen = screen(model, current.linear, blocks, effect, place, clues)
+        seen = screen(model, current.linear, blocks, effects()[effect], place, clues)
         if seen is None or not seen.starts:
             continue
         near = quick_refit(current, seen)

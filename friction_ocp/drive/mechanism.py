@@ -145,8 +145,7 @@ class Mechanism:
 
     def loaded_joints(self) -> tuple[Transmission, ...]:
         """Rigid joints whose transmitted torque some friction depends on: the algebraic variables."""
-        loaded = [shaft for shaft in self.drive.shafts if shaft.friction.load is not None]
-        joints = {joint.name for shaft in loaded for joint in self.load_joints(shaft)}
+        joints = {joint.name for shaft in self._loaded() for joint in self.load_joints(shaft)}
         return tuple(joint for joint in self.topology.rigid if joint.name in joints)
 
     def load_joints(self, shaft: Shaft) -> tuple[Transmission, ...]:
@@ -168,8 +167,11 @@ class Mechanism:
 
     def loading_motors(self) -> tuple[Motor, ...]:
         """Motors whose own torque loads the friction of their shaft: a gear between them is part of that shaft."""
-        loaded = [shaft for shaft in self.drive.shafts if shaft.friction.load is not None]
-        return tuple(motor for shaft in loaded if not self.load_joints(shaft) for motor in self.motors_on(shaft))
+        alone = [shaft for shaft in self._loaded() if not self.load_joints(shaft)]
+        return tuple(motor for shaft in alone for motor in self.motors_on(shaft))
+
+    def _loaded(self) -> list[Shaft]:
+        return [shaft for shaft in self.drive.shafts if shaft.friction.load is not None]
 
     def shaft_angle(self, name: str, motion: Motion) -> Any:
         """Return the angle of a shaft."""

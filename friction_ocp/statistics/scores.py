@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,28 +31,40 @@ class Scores:
 class Errors:
     """Errors that have one size: those of a channel, or of static points of one kind over their standard errors."""
 
-    train: FloatArray
+    series: tuple[FloatArray, ...]
+    """Of training, each in the order of time where there is one; NaN where a sample is missing."""
     unseen: FloatArray
     """Of validation recordings or points."""
-    independent: float
-    """How many of the training errors are."""
+    correlated: bool = True
+    """Whether neighbours within a series may be."""
+
+    @cached_property
+    def train(self) -> FloatArray:
+        """All errors of training."""
+        return _told(self.series)
+
+    @property
+    def independent(self) -> float:
+        """How many of the training errors are."""
+        return sum(map(effective_size, self.series)) if self.correlated else float(self.train.size)
 
 
 def errors_of(simulation: Simulation) -> Mapping[str, Errors]:
     """Return errors by channel, and by what static points hold."""
     found = dict[str, Errors]()
     for column, name in enumerate(simulation.units):
-        series = [run.simulated[:, column] - run.measured[:, column] for run in simulation.train]
-        independent = sum(map(effective_size, series))
-        unseen = [run.simulated[:, column] - run.measured[:, column] for run in simulation.validation]
-        found[name] = Errors(_told(series), _told(unseen), independent)
+        train, unseen = (
+            tuple(run.simulated[:, column] - run.measured[:, column] for run in runs)
+            for runs in (simulation.train, simulation.validation)
+        )
+        found[name] = Errors(train, _told(unseen))
     for effort in dict.fromkeys(item.effort for item in simulation.static):
         sets = [item for item in simulation.static if item.effort == effort]
         scaled = {item.name: (item.predicted - item.measured) / item.std_error for item in sets}
         train, unseen = (
-            _told([scaled[item.name] for item in sets if item.split == split]) for split in ("train", "validation")
+            tuple(scaled[item.name] for item in sets if item.split == split) for split in ("train", "validation")
         )
-        found[f"{effort} of static points"] = Errors(train, unseen, float(train.size))
+        found[f"{effort} of static points"] = Errors(train, _told(unseen), correlated=False)
     return {name: item for name, item in found.items() if item.train.size}
 
 

@@ -9,7 +9,7 @@ from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.bench import Bench, Seat, bettered, open_bench
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.easing import FAR, missed
+from friction_ocp.diagnosis.easing import FAR
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.effects.registry import effects
@@ -48,8 +48,7 @@ def test_a_fit_that_is_not_the_best_is_bettered(bench: Bench) -> None:
 def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
     """Where much is missed no better end is looked for; candidates begin at the guesses, with additions as they are."""
     far = moved(bench, 2.0)
-    program = far.current.linear.program
-    assert missed(program, far.current.linear.point) > FAR and far.astray and not bench.astray
+    assert far.current.missed > FAR and far.current.astray and not bench.current.astray
     assert bettered(far, HERE) is far
 
     added = effects()["unbalance"].addition(bench.problem.drive, "motor", clues_of(bench.current)).drive
