@@ -51,6 +51,11 @@ Value = Any
 """float, Free, Tie or Directional in a drive as read; float or SX in a drive whose values are bound."""
 
 
+def start_of(value: Value) -> Value:
+    """Return where a number starts: itself, or its guess where it is fitted."""
+    return value.guess if isinstance(value, Free) else value
+
+
 def is_off(value: Value) -> bool:
     """Whether a number is plainly zero or absent: known, and neither fitted nor tied."""
     return value is None or (isinstance(value, (int, float)) and value == 0)

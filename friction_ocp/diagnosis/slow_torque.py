@@ -25,7 +25,7 @@ from friction_ocp.effects.effect import (
     either_way,
     moving_shafts,
 )
-from friction_ocp.parameters import Free
+from friction_ocp.parameters import start_of
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 STRETCHES = 24
@@ -99,7 +99,7 @@ def _offset(fitted: FittedModel, channel: Channel) -> float:
 
 
 def _number(fitted: FittedModel, path: str, stated: object) -> float:
-    guess = stated.guess if isinstance(stated, Free) else stated
+    guess = start_of(stated)
     return fitted.values.get(path, float(guess) if isinstance(guess, (int, float)) else 0.0)
 
 

@@ -26,7 +26,7 @@ from friction_ocp.effects.effect import (
 from friction_ocp.effects.friction_curve import SHARE, is_dry
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.wave import Wave
-from friction_ocp.parameters import Free
+from friction_ocp.parameters import Free, start_of
 
 
 def wave(
@@ -46,8 +46,8 @@ OVERTONE = 0.1
 
 def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
-    own = float(np.hypot(clues.numbers.get(f"{path}.cosine", 1.0), clues.numbers.get(f"{path}.sine", 1.0)))
-    size = OVERTONE * own or OVERTONE
+    cosine, sine = (clues.numbers.get(f"{path}.{name}", start_of(getattr(part, name))) for name in ("cosine", "sine"))
+    size = OVERTONE * float(np.hypot(cosine, sine)) or OVERTONE
     names = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
     paths = [f"{path}.{name}" for name in names]
     trial = Trial(tuple({name: size} for name in paths))

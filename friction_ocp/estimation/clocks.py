@@ -8,7 +8,7 @@ from typing import Any
 
 from friction_ocp.drive.parts import Clock, Drive
 from friction_ocp.estimation.problem import Problem, RecordingUse
-from friction_ocp.parameters import Free, Value
+from friction_ocp.parameters import Value, start_of
 from friction_ocp.simulation.grid import FloatArray
 
 Moves = Mapping[str, Mapping[str, tuple[float, float]]]
@@ -39,7 +39,7 @@ def _guessed(use: RecordingUse, drive: Drive) -> dict[str, tuple[float, float]]:
     def number(clock: Clock, key: str, value: Value) -> float:
         if f"{clock.path}.{key}" in use.set:
             return use.set[f"{clock.path}.{key}"]
-        known: Any = value.guess if isinstance(value, Free) else value
+        known: Any = start_of(value)
         return float(known) if isinstance(known, (int, float)) else 0.0
 
     return {

@@ -33,6 +33,7 @@ from friction_ocp.friction.composite import AddedFriction, StribeckRise, Sum
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.static import CoulombViscous
+from friction_ocp.parameters import Free
 
 EXPONENT = 0.8
 LAW = CoulombViscous(0.1, 0.02)
@@ -94,6 +95,16 @@ def test_a_shape_begins_as_what_it_was(name: str) -> None:
     assert off == pytest.approx(plain, rel=1e-12)
     sizes = [1.0] * len(found.trials[0].amplitudes)
     assert moved(found.drive, found.trials[0].values(found.off, sizes)) != pytest.approx(plain, rel=1e-9)
+
+
+def test_overtones_start_small_beside_a_wave_that_is_not_fitted_yet() -> None:
+    """Where nothing is known of the size of a wave, its guess tells."""
+    small = 2e-4
+    drive = geared(cogging=Cogging(Free(small), Free(0.0), 0.7))
+    found = effects()["cogging"].reshaped(drive, "motor", Clues((), {}, {}))
+    assert found is not None
+    sizes = [size for trial in found.trials for grown in trial.amplitudes for size in grown.values()]
+    assert sizes == pytest.approx([0.1 * small] * len(sizes))
 
 
 def test_other_effects_keep_their_shape() -> None:

@@ -18,7 +18,7 @@ from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import resolve_ties
-from friction_ocp.parameters import Free, Leaf, Tie, leaves
+from friction_ocp.parameters import Leaf, Tie, leaves, start_of
 from friction_ocp.recording.conditioning import smooth_motion
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
@@ -234,7 +234,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def _start(value: Any) -> float:
-    return float(value.guess if isinstance(value, Free) else value)
+    return float(start_of(value))
 
 
 Rule = Callable[[Case], Iterator[Finding]]
