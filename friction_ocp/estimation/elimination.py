@@ -28,9 +28,10 @@ class Reduced:
     gradient: FloatArray
     recordings: tuple[Eliminated, ...]
 
-    def node_steps(self, step: FloatArray) -> tuple[FloatArray, ...]:
-        """Return the node steps that belong to a parameter step."""
-        return tuple(item.constant + np.tensordot(item.by_theta, step, 1) for item in self.recordings)
+    def node_steps(self, step: FloatArray, follow: bool = False) -> tuple[FloatArray, ...]:
+        """Return the node steps that belong to a parameter step; those that `follow` it have no part of their own."""
+        own = 0.0 if follow else 1.0
+        return tuple(own * item.constant + np.tensordot(item.by_theta, step, 1) for item in self.recordings)
 
 
 def reduce_system(system: Linearisation, damping: float, scale: FloatArray | None = None) -> Reduced:

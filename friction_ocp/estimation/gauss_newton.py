@@ -104,7 +104,7 @@ def solve_gauss_newton(
     now = _Iterate(point, system, Trust(tolerances.first_damping, np.diag(system.theta_theta)))
     vanished, slow = VANISHED * system.objective, 0
     for iteration in range(1, tolerances.max_iterations + 1):
-        following = _descend(program, now, tolerances)
+        following = _descend(program, now, tolerances) or _undamped(program, now, tolerances)
         if following is None:
             return _stuck(program, now, iteration, tolerances, vanished)
         if following is now:
@@ -113,7 +113,10 @@ def solve_gauss_newton(
         now = following
         slow = slow + 1 if gained <= tolerances.progress * now.system.objective else 0
         if slow >= 3:
-            return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
+            further = _undamped(program, now, tolerances)
+            if further is None:
+                return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
+            now, slow = further, 0
         if watch is not None:
             watch(iteration, now.system.objective, now.point)
     return Solution(now.point, now.system.objective, tolerances.max_iterations, False, "iteration limit reached")
@@ -139,6 +142,26 @@ def _descend(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterat
                 trust = Trust(damping, now.trust.scale).after(gained / max(predicted, 1e-300), after)
                 return _Iterate(trial, after, trust, first)
         damping, grow = damping * grow, grow * 2.0
+    return None
+
+
+def _undamped(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterate | None:
+    """Return what follows a step without damping where that gains more than next to nothing.
+
+    Parameters that are well seen one by one and hardly seen together, such as a torque constant and all that it is
+    traded for, have a long way to go along which damping, which looks at each, lets them creep. Nodes that rest at
+    kinks have steps of their own that lead nowhere: in a second trial nodes do no more than follow the parameters.
+    """
+    space, system = program.space, now.system
+    enough = max(tolerances.progress * system.objective, tolerances.negligible)
+    for follow in (False, True):
+        trial, predicted = trial_step(space, now.point, system, UNDAMPED, now.trust.scale, follow)
+        if predicted <= enough or not system.objective - program.objective(trial) > enough:
+            continue
+        after = program.linearise(trial)
+        if not np.any(_faded(after, now.trust.scale, LOST)):
+            gained = system.objective - after.objective
+            return _Iterate(trial, after, Trust(UNDAMPED, now.trust.scale).after(gained / predicted, after))
     return None
 
 
@@ -173,11 +196,17 @@ def _stuck(program: Program, now: _Iterate, iteration: int, tolerances: Toleranc
 
 
 def trial_step(
-    space: ParameterSpace, point: Point, system: Linearisation, damping: float, scale: FloatArray | None = None
+    space: ParameterSpace,
+    point: Point,
+    system: Linearisation,
+    damping: float,
+    scale: FloatArray | None = None,
+    follow: bool = False,
 ) -> tuple[Point, float]:
     """Return the damped Gauss-Newton point and the decrease that the quadratic model predicts.
 
     `scale` (parameters,) is what damping of the parameters is relative to; None takes the diagonal of the Hessian.
+    Nodes that only `follow` the parameters do not move of their own.
     """
     reduced = reduce_system(system, damping, scale)
     rows, margins = linear_constraints(space.constraints, point.theta)
@@ -186,7 +215,7 @@ def trial_step(
     )
     theta = space.clip(point.theta + step)
     step = theta - point.theta
-    moves = reduced.node_steps(step)
+    moves = reduced.node_steps(step, follow)
     nodes = tuple(old + move for old, move in zip(point.nodes, moves, strict=True))
     return Point(theta, nodes), _predicted(system, step, moves)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from smooth_programs import offset_rosenbrock, rosenbrock, toy
+from smooth_programs import ToySpace, offset_rosenbrock, rosenbrock, toy
 
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.program import Blocks, Linearisation, Point
 
 TIGHT = Tolerances(decrease=1e-12, negligible=0.0)
 
@@ -97,3 +99,38 @@ def test_residuals_of_rounding_errors_are_an_answer() -> None:
     solution = solve_gauss_newton(program, program.start, Tolerances(decrease=0.0, negligible=0.0, progress=0.0))
     assert solution.converged
     assert solution.point.theta == pytest.approx([0.3, 1.0, 0.7, 2.5], rel=1e-8)
+
+
+@dataclass(frozen=True)
+class Kinked:
+    """Two parameters seen in their difference, one of them pulled far, beside a node that rests at a kink."""
+
+    space: ToySpace
+    segments: tuple[()] = ()
+
+    def objective(self, point: Point) -> float:
+        """Return the cost of a point."""
+        return self.linearise(point).objective
+
+    def linearise(self, point: Point) -> Linearisation:
+        """Return objective, gradient and Gauss-Newton Hessian; the slope at the kink is that of its right side."""
+        node, (first, second) = float(point.nodes[0][0, 0]), point.theta
+        residuals = np.array([1e3 * (first - second), 0.1 * (first - 10.0)])
+        by_theta = np.array([[1e3, -1e3], [0.1, 0.0]])
+        kink, slope = 30.0 * (1.0 + abs(node)), 30.0 if node >= 0.0 else -30.0
+        blocks = Blocks(
+            node_node=np.full((1, 1, 1), slope**2),
+            node_gradient=np.full((1, 1), slope * kink),
+            node_theta=np.zeros((1, 1, 2)),
+            node_next=np.zeros((0, 1, 1)),
+        )
+        cost = 0.5 * float(residuals @ residuals) + 0.5 * kink**2
+        return Linearisation(cost, by_theta.T @ by_theta, by_theta.T @ residuals, (blocks,))
+
+
+def test_a_node_at_a_kink_does_not_hold_parameters_that_are_traded_for_one_another() -> None:
+    """Every damped step of the node alone is uphill by more than parameters gain that damping lets creep."""
+    program: Any = Kinked(ToySpace(np.zeros(2), np.full(2, -100.0), np.full(2, 100.0)))
+    solution = solve_gauss_newton(program, Point(np.zeros(2), (np.zeros((1, 1)),)))
+    assert solution.point.theta == pytest.approx([10.0, 10.0], abs=0.3)  # what USUAL leaves
+    assert solution.objective == pytest.approx(450.0, rel=1e-6)
