@@ -39,7 +39,7 @@ from friction_ocp.statistics.workshop import Workshop
 
 Tell = Callable[[str, float], None]
 """Called with what is being done and the share of a round that is done."""
-NUDGES, MOST_TURNS = 4, 3
+NUDGES, MOST_TURNS = 2, 3
 """Fits from parameters changed by chance at a time, and how often they may go on from a better one."""
 LOSSES = (Absolute, Huber, Squares, StudentT)
 

@@ -22,7 +22,7 @@ from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gau
 from friction_ocp.estimation.model import Model, in_time, with_drive
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
-from friction_ocp.estimation.splicing import spliced
+from friction_ocp.estimation.splicing import carried_on, spliced
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
@@ -205,7 +205,20 @@ def polished(
 
 def begun(program: Program, theta: FloatArray) -> Point:
     """Return parameters with the nodes that fit them best."""
-    return settled(program, solve_nodes(program, Point(theta, program.suggested_nodes(theta))))
+    point = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    return joined(program, settled(program, point))
+
+
+def joined(program: Program, point: Point) -> Point:
+    """Return the point with nodes that go on from where the segments before them end, as long as that leads on."""
+    cost = program.objective(point)
+    for _ in range(MOST_TURNS):
+        trial = solve_nodes(program, carried_on(program, point), STEPS_OF_NODES)
+        after = program.objective(trial)
+        if not after < cost - UNIMPORTANT:
+            break
+        point, cost = trial, after
+    return point
 
 
 def timed(fitted: FittedModel, limits: Tolerances = WARM) -> FittedModel:
@@ -284,23 +297,28 @@ def freed(fitted: FittedModel) -> FittedModel:
     program, point = fitted.linear.program, fitted.linear.point
     beyond = around_kinks(fitted.model, program, point, WARM)
     best = beyond.point if beyond.objective < fitted.objective else point
-    moved = unstuck(fitted.model, program, best)
-    if moved is not best:
+    for _ in range(MOST_TURNS):
+        moved = unstuck(fitted.model, program, best)
+        if moved is best:
+            break
         best = solve_gauss_newton(program, moved, WARM).point
     return fitted if best is point else replace(fitted, linear=linear_program(program, best))
 
 
 def unstuck(model: Model, program: Program, point: Point) -> Point:
-    """Return the point with other nodes where friction with a hardly smoothed sign leads to better ones."""
-    best, cost = point, program.objective(point)
+    """Return the point with other nodes where fresh ones, or friction with a hardly smoothed sign, lead to better."""
+    best = _with_better(program, point, begun(program, point.theta))
     for width in HARDLY:
         rounded = replace(program, width=width * model.speed_scale)
         beyond = solve_nodes(program, solve_nodes(rounded, best, NODE_STEPS), NODE_STEPS)
-        trial = solve_nodes(program, spliced(program, best, beyond), STEPS_OF_NODES)
-        after = program.objective(trial)
-        if after < cost - UNIMPORTANT:
-            best, cost = trial, after
+        best = _with_better(program, best, beyond)
     return best
+
+
+def _with_better(program: Program, point: Point, other: Point) -> Point:
+    """Return the point with the better stretches of nodes of another, where that is worth a step."""
+    trial = joined(program, solve_nodes(program, spliced(program, point, other), STEPS_OF_NODES))
+    return trial if program.objective(trial) < program.objective(point) - UNIMPORTANT else point
 
 
 def nudged(fitted: FittedModel, seed: int) -> FittedModel:
@@ -314,7 +332,7 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     end = polished(fitted.model, fitted.footing, theta, None, QUICK)
     if not end.objective < CLOSE_BY * fitted.objective:
         return end
-    return polished(end.model, end.footing, end.theta, end.linear.point.nodes)
+    return freed(polished(end.model, end.footing, end.theta, end.linear.point.nodes))
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:

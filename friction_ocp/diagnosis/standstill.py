@@ -13,7 +13,7 @@ from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
-STEPS = 15
+STEPS = 6
 """Of the nodes of a recording from a start at rest."""
 BEGINNING = 20
 """Samples from which a recording that does not start at rest is told."""

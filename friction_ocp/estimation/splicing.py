@@ -34,6 +34,22 @@ def spliced(program: Program, point: Point, other: Point) -> Point:
     return Point(point.theta, tuple(nodes))
 
 
+def carried_on(program: Program, point: Point) -> Point:
+    """Return the point with nodes where the segments before them end, wherever that costs less: every other at a time.
+
+    A shaft that has stopped in one segment slides on in the next where a node lies a little beside rest: no derivative
+    shows the way back.
+    """
+    for first in (1, 2):
+        nodes: list[FloatArray] = []
+        for index, own in enumerate(point.nodes):
+            after = own.copy()
+            after[first::2] = program.simulate(index, point).end[first - 1 : -1 : 2]
+            nodes.append(after)
+        point = spliced(program, point, Point(point.theta, tuple(nodes)))
+    return point
+
+
 def _costs(program: Program, index: int, point: Point) -> tuple[FloatArray, FloatArray]:
     """Return (segments,) costs of the samples in each segment, and (segments + 1,) of the gap before each."""
     cut, result = program.segments[index], program.simulate(index, point)

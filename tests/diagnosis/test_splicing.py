@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
 
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, fit_base, unstuck
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.splicing import spliced
+from friction_ocp.estimation.splicing import carried_on, spliced
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.grid import FloatArray
 
@@ -47,3 +47,21 @@ def test_nothing_is_taken_that_costs_more(fitted: FittedModel) -> None:
     worse = Point(point.theta, tuple(moved(nodes, 5, 30) for nodes in point.nodes))
     for nodes, right in zip(spliced(program, point, worse).nodes, point.nodes, strict=True):
         np.testing.assert_array_equal(nodes, right)
+
+
+def test_a_node_that_is_off_is_carried_on_from_the_segment_before(fitted: FittedModel) -> None:
+    """Where one node is wrong, the segment before it ends where it should be."""
+    program, point = fitted.linear.program, fitted.linear.point
+    wrong = Point(point.theta, tuple(moved(nodes, 9, 10) for nodes in point.nodes))
+    best, bad, mended = map(program.objective, (point, wrong, carried_on(program, wrong)))
+    assert mended < best + 0.01 * (bad - best)
+    assert program.objective(carried_on(program, point)) <= best
+
+
+def test_nodes_come_back_from_a_shaft_that_slides_where_it_stuck(fitted: FittedModel) -> None:
+    """From speeds that are wrong everywhere the nodes of the fit, or as good ones, are found again."""
+    program, point = fitted.linear.program, fitted.linear.point
+    astray = Point(point.theta, tuple(nodes + np.array([0.0, 0.3]) for nodes in point.nodes))
+    found = unstuck(fitted.model, program, astray)
+    assert program.objective(astray) > 2.0 * program.objective(point)
+    assert program.objective(found) < program.objective(point) + UNIMPORTANT
