@@ -21,6 +21,7 @@ class DriveLagEffect(AbstractEffect):
 
     name: ClassVar[str] = "drive_lag"
     sentence: ClassVar[str] = "the torque follows the command late"
+    resembles: ClassVar[tuple[str, ...]] = ("sensor_delay",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [motor.shaft for motor in _motors(drive) if is_off(motor.lag)]

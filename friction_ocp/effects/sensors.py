@@ -76,6 +76,7 @@ class SensorDelayEffect(AbstractEffect):
 
     name: ClassVar[str] = "sensor_delay"
     sentence: ClassVar[str] = "the channel is late"
+    resembles: ClassVar[tuple[str, ...]] = ("drive_lag",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in drive.outputs if item in _analog(drive) and item.delay == 0.0]
