@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, begun, completed, fit_base, nudged, quick_refit
+from friction_ocp.diagnosis.fitting import (
+    UNIMPORTANT,
+    FittedModel,
+    begun,
+    fit_base,
+    nudged,
+)
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.rival import Rival, Standing
-from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
-from friction_ocp.effects.effect import Augmentation, Clues, Trial
-from friction_ocp.effects.registry import effects
+from friction_ocp.effects.effect import Clues
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
@@ -30,7 +33,7 @@ from friction_ocp.estimation.program import Point
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.plain import plain, restored
-from friction_ocp.execution.run import Tally, run_tasks
+from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
@@ -180,13 +183,18 @@ def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> Fl
 
 
 def open_bench(problem: Problem, execution: Execution) -> Bench:
-    """Fit the base model in this process, or read its end from the output folder; then try to better it."""
-    workshop, task = Workshop(problem), Task("base", fit_base_model)
-    with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
-    found = _value(with_one["base"])
-    bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    """Fit the base model, then try to better it."""
+    bench = first_bench(problem, execution)
     better = bettered(bench, execution)
     return replace(better, base_point=better.seat.point)
+
+
+def first_bench(problem: Problem, execution: Execution) -> Bench:
+    """Fit the base model in this process, or read its end from the output folder."""
+    workshop, task = Workshop(problem), Task("base", fit_base_model)
+    with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
+    found = value_of(with_one["base"])
+    return Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
 
 
 def bettered(bench: Bench, execution: Execution) -> Bench:
@@ -202,7 +210,7 @@ def bettered(bench: Bench, execution: Execution) -> Bench:
         tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]
         shared = bench.fingerprint
         outcomes = run_tasks("looking for a better fit", tasks, bench, shared, execution.executor, execution.ledger)
-        ends = [value for value in map(_value, outcomes.values()) if value is not None]
+        ends = [value for value in map(value_of, outcomes.values()) if value is not None]
         end = min(ends, key=lambda value: restored(value["objective"]), default=None)
         if end is None or restored(end["objective"]) >= known - UNIMPORTANT:
             break
@@ -224,156 +232,9 @@ def fit_base_model(workshop: Workshop) -> Json:
     return {"footing": footing_document(fitted.footing), "point": point_document(fitted)}
 
 
-@dataclass(frozen=True)
-class Refit:
-    """A candidate after a few steps."""
-
-    screened: Screened
-    point: Json
-    cost: float
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """Effect and component."""
-        return self.screened.key
-
-
-@dataclass(frozen=True)
-class Crew:
-    """Hands out the work of one round and takes what comes back."""
-
-    bench: Bench
-    execution: Execution
-    number: int
-    tell: Tell
-
-    def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
-        """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
-        tasks = [self._task("screen", key, screen_candidate, key) for key in candidates]
-        return self._tested("screening", tasks, 0.0)
-
-    def screened_unfitted(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
-        """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
-        tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
-        return self._tested("screening from the guesses", tasks, 0.25)
-
-    def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
-        found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
-        return sorted(found, key=lambda item: -item.gain)
-
-    def without(
-        self, shortlist: Sequence[Screened], unfitted: Sequence[Screened] = ()
-    ) -> tuple[FloatArray, list[Refit]]:
-        """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps.
-
-        Those of `unfitted` begin at the guesses; of two refits of one candidate the better one counts. Candidates whose
-        simulation breaks down on the way are left out.
-        """
-        tasks = [Task(f"{self.number}-held-out", held_out_costs)]
-        tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
-        tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]
-        costs, *ends = self._run("refits", tasks, 0.5)
-        best = dict[tuple[str, str], Refit]()
-        for item, end in zip([*shortlist, *unfitted], ends, strict=True):
-            cost = np.inf if end is None else float(restored(end["cost"]))
-            if end is not None and (item.key not in best or cost < best[item.key].cost):
-                best[item.key] = Refit(item, end["point"], cost)
-        return restored(costs), list(best.values())
-
-    def rivals(self, tried: Sequence[Refit], without: FloatArray) -> list[Rival]:
-        """Return candidates whose refits are completed, with what they gain on recordings left out."""
-        tasks = [
-            self._task("complete", refit.key, complete_candidate, (screened_document(refit.screened), refit.point))
-            for refit in tried
-        ]
-        values = self._run("completing refits", tasks, 0.75)
-        return [
-            Rival(
-                refit.screened,
-                restored(value["standing"], (Standing,)),
-                without - restored(value["costs"]),
-                partial(seat_candidate, self.bench, refit.screened, value["point"]),
-            )
-            for refit, value in zip(tried, values, strict=True)
-        ]
-
-    def _task(self, what: str, key: tuple[str, str], function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
-        return Task(f"{self.number}-{what}-{key[0]}-{key[1]}", function, arguments)
-
-    def _run(self, what: str, tasks: Sequence[Task], begin: float) -> list[Json]:
-        def watch(tally: Tally) -> None:
-            self.tell(f"{what}: {tally.done} of {tally.total}", begin + 0.25 * tally.done / max(tally.total, 1))
-
-        bench, run = self.bench, self.execution
-        outcomes = run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch)
-        return [_value(outcome) for outcome in outcomes.values()]
-
-
-def _value(outcome: Outcome) -> Json:
+def value_of(outcome: Outcome) -> Json:
+    """Return what a task has found; raises FrictionOcpError where it failed."""
     if outcome.error:
         remedy = "run the same command again: it goes on from there" if outcome.lost else ""
         raise FrictionOcpError(Finding(f"diagnose: {outcome.key}", outcome.error, remedy=remedy))
     return outcome.value
-
-
-def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
-    """Test an effect at a place; null where the drive with it cannot be simulated."""
-    return _tested(bench, bench.current, bench.blocks, effect, place)
-
-
-def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
-    """Test an effect at a place with all parameters at their guesses; null where that cannot be simulated."""
-    start = bench.unfitted
-    return None if start is None else _tested(bench, start, bench.unfitted_blocks, effect, place)
-
-
-def _tested(bench: Bench, start: FittedModel, blocks: Blocks, effect: str, place: str) -> Json:
-    seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
-    return None if seen is None else screened_document(seen)
-
-
-def held_out_costs(bench: Bench) -> Json:
-    """Return (blocks,) costs of the current model on recordings left out."""
-    return plain(bench.blocks.sums(held_out(bench.current)))
-
-
-def refit_candidate(bench: Bench, content: Json) -> Json:
-    """Refit a candidate, a few steps; null where its simulation breaks down."""
-    return _refitted(bench.current, restored_screened(bench, content))
-
-
-def refit_unfitted(bench: Bench, content: Json) -> Json:
-    """Refit a candidate from the guesses, a few steps; null where its simulation breaks down."""
-    assert bench.unfitted is not None
-    return _refitted(bench.unfitted, restored_screened(bench, content))
-
-
-def _refitted(start: FittedModel, item: Screened) -> Json:
-    fitted = quick_refit(start, item)
-    return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
-
-
-def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
-    """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
-    fitted = completed(seat_candidate(bench, restored_screened(bench, content), point))
-    costs = blocks_like(bench.current, fitted, bench.blocks)
-    standing = Standing.of(fitted, bench.standard.is_material(fitted))
-    return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
-
-
-def seat_candidate(bench: Bench, item: Screened, point: Json) -> FittedModel:
-    """Return the refit of a candidate where it stands."""
-    return seated(with_drive(bench.current.model, item.augmentation.drive), bench.current.footing, point)
-
-
-def screened_document(item: Screened) -> Json:
-    """Return a score test without its drive, which effect and place bring back."""
-    return plain({part.name: getattr(item, part.name) for part in fields(item) if part.name != "augmentation"})
-
-
-def restored_screened(bench: Bench, content: Json) -> Screened:
-    """Return the score test with its drive."""
-    found: Mapping[str, Any] = restored(content, (Start, Trial))
-    drive = bench.current.model.problem.drive
-    augmentation: Augmentation = effects()[found["effect"]].addition(drive, found["component"], bench.clues)
-    return Screened(**found, augmentation=augmentation)

@@ -6,9 +6,10 @@ import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from friction_ocp.diagnosis.bench import Tell, open_bench, screen_candidate
+from friction_ocp.diagnosis.bench import Tell, first_bench, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
@@ -137,7 +138,7 @@ def diagnose(
     if other is None or not stated.gap:
         return stated
     tell("the inputs read the other way", 0.0)
-    if not explains_more(open_bench(other, execution).base, stated.final, stated.accepted, stated.left_over):
+    if not explains_more(first_bench(other, execution).base, stated.final, stated.accepted, stated.left_over):
         return stated
     read = _diagnosed(other, tell, execution)
     simpler = not read.left_over and (stated.left_over or len(read.accepted) < len(stated.accepted))

@@ -257,6 +257,14 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     return min(ends, key=lambda fitted: fitted.objective)
 
 
+def begun_at_size(base: FittedModel, item: Screened, scale: float) -> FittedModel:
+    """Fit a candidate, a few steps from a multiple of its predicted size, all else as it was."""
+    drive = item.augmentation.drive
+    model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
+    values = base.values | item.starts[0].added(item.augmentation.off, scale)
+    return _steps(base, model, base.footing.training(model), _point(base, model, built, values))
+
+
 def _launches(
     base: FittedModel, item: Screened, start: Start, model: Model, built: Contrast, program: Program
 ) -> list[Point]:

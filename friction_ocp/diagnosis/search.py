@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Bench, Crew, Tell, bettered
+from friction_ocp.diagnosis.bench import Bench, Tell, bettered
+from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, without_addition
 from friction_ocp.diagnosis.free_gap import free_errors, shrink
@@ -33,7 +34,7 @@ from friction_ocp.statistics.execution import Execution
 MOST_ROUNDS = 4
 FINISHED, CLOSE = 2, 1.5
 """Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
-this factor."""
+this factor. As many begin again at other sizes where that leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is."""
@@ -197,7 +198,7 @@ class Search:
         unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
-        for rivals in _completed(crew, chosen, unfitted, known):
+        for rivals in _completed(crew, chosen, unfitted, known, enough):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)
@@ -215,11 +216,16 @@ def _promising(found: Sequence[Screened]) -> list[Screened]:
 
 
 def _completed(
-    crew: Crew, chosen: Sequence[Screened], unfitted: Sequence[Screened], known: Mapping[Key, Screened]
+    crew: Crew,
+    chosen: Sequence[Screened],
+    unfitted: Sequence[Screened],
+    known: Mapping[Key, Screened],
+    enough: float,
 ) -> Iterator[list[Rival]]:
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
-    What fits best where it was fitted may be worth nothing on recordings left out.
+    What fits best where it was fitted may be worth nothing on recordings left out. Where it gains `enough` and yet will
+    not do, it may have come to rest on the way: at last the best of those begin at other sizes.
     """
     if not chosen:
         return
@@ -235,4 +241,9 @@ def _completed(
     rivals = crew.rivals(pairs[:count], without)
     yield rivals
     if len(pairs) > count:
-        yield [*rivals, *crew.rivals(pairs[count:], without)]
+        rivals = [*rivals, *crew.rivals(pairs[count:], without)]
+        yield rivals
+    rivals.sort(key=lambda item: item.standing.cost)
+    again = [item for item in rivals if current.cost - item.standing.cost >= enough and item.screened.starts][:FINISHED]
+    if again:
+        yield [*crew.retried(again, without), *(item for item in rivals if item not in again)]

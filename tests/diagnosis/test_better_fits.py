@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.bench import Bench, Seat, bettered, open_bench
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.crew import Crew, held_out_costs
 from friction_ocp.diagnosis.easing import FAR
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.execution.executor import InProcess
+from friction_ocp.execution.plain import restored
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
 
 HERE = Execution(InProcess())
+UNBALANCE = 0.03
+"""N m."""
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +69,23 @@ def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
     assert begun is not None
     space = bench.base.model.space
     assert begun.values == pytest.approx(dict(zip(space.names, space.guess, strict=True)) | known)
+
+
+def test_a_refit_that_came_to_rest_on_the_way_begins_at_other_sizes(tmp_path: Path) -> None:
+    """The better end counts; an end that is the best one stays."""
+    plant = axis()
+    plant = replace(plant, shafts=(replace(plant.shafts[0], gravity=(UNBALANCE, 0.4)),))
+    bench = open_bench(load_problem(write_case(tmp_path, plant)), HERE)
+    crew = Crew(bench, HERE, 1, lambda what, share: None)
+    item = crew.screened([("unbalance", "motor")])[0]
+    model = with_drive(bench.current.model, item.augmentation.drive)
+    theta = model.space.with_known(bench.current.values | item.starts[0].added(item.augmentation.off, 0.2))
+    program = bench.current.footing.training(model)
+    at = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    resting = FittedModel(model, bench.current.footing, linear_program(program, at))
+    without = restored(held_out_costs(bench))
+    known = Rival.of(item, resting, np.zeros(bench.blocks.count))
+    (better,) = crew.retried([known], without)
+    assert better.standing.values["motor.gravity.torque"] == pytest.approx(UNBALANCE, rel=0.02)
+    assert better.standing.cost < known.standing.cost - 10.0 * UNIMPORTANT and np.sum(better.gains) > 0.0
+    assert crew.retried([better], without)[0].standing.cost <= better.standing.cost

@@ -10,13 +10,14 @@ import pytest
 from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, write_case
 from plant import PlantFriction, PlantRipple
 
-from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench, screen
+from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import completed, quick_refit
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reexamine import exchanged
 from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.select import Round, choose
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Gravity

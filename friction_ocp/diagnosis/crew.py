@@ -1,0 +1,195 @@
+"""Hands out the work of one round, task by task, and takes what comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
+from friction_ocp.diagnosis.blocks import Blocks
+from friction_ocp.diagnosis.fitting import FittedModel, begun_at_size, completed, quick_refit
+from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.screen import Screened, Start, screen
+from friction_ocp.effects.effect import Augmentation, Trial
+from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.model import with_drive
+from friction_ocp.execution.plain import plain, restored
+from friction_ocp.execution.run import Tally, run_tasks
+from friction_ocp.execution.task import Json, Task
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.statistics.execution import Execution
+
+OTHER_SIZES = (3.0, 1.0 / 3.0)
+"""Sizes over the predicted one at which the best candidates begin again where nothing else explains a gap."""
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A candidate after a few steps."""
+
+    screened: Screened
+    point: Json
+    cost: float
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and component."""
+        return self.screened.key
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Hands out the work of one round and takes what comes back."""
+
+    bench: Bench
+    execution: Execution
+    number: int
+    tell: Tell
+
+    def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+        """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
+        tasks = [self._task("screen", key, screen_candidate, key) for key in candidates]
+        return self._tested("screening", tasks, 0.0)
+
+    def screened_unfitted(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+        """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
+        tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
+        return self._tested("screening from the guesses", tasks, 0.25)
+
+    def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
+        found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
+        return sorted(found, key=lambda item: -item.gain)
+
+    def without(
+        self, shortlist: Sequence[Screened], unfitted: Sequence[Screened] = ()
+    ) -> tuple[FloatArray, list[Refit]]:
+        """Return (blocks,) held-out costs of the current model, and refits of candidates after a few steps.
+
+        Those of `unfitted` begin at the guesses; of two refits of one candidate the better one counts. Candidates whose
+        simulation breaks down on the way are left out.
+        """
+        tasks = [Task(f"{self.number}-held-out", held_out_costs)]
+        tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
+        tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]
+        costs, *ends = self._run("refits", tasks, 0.5)
+        best = dict[tuple[str, str], Refit]()
+        for item, end in zip([*shortlist, *unfitted], ends, strict=True):
+            cost = np.inf if end is None else float(restored(end["cost"]))
+            if end is not None and (item.key not in best or cost < best[item.key].cost):
+                best[item.key] = Refit(item, end["point"], cost)
+        return restored(costs), list(best.values())
+
+    def rivals(self, tried: Sequence[Refit], without: FloatArray) -> list[Rival]:
+        """Return candidates whose refits are completed, with what they gain on recordings left out."""
+        tasks = [
+            self._task("complete", refit.key, complete_candidate, (screened_document(refit.screened), refit.point))
+            for refit in tried
+        ]
+        values = self._run("completing refits", tasks, 0.75)
+        return [self._rival(refit.screened, value, without) for refit, value in zip(tried, values, strict=True)]
+
+    def retried(self, known: Sequence[Rival], without: FloatArray) -> list[Rival]:
+        """Return rivals, each from the best of the end that is known and those that begin at other sizes."""
+        pairs = [(item, k) for item in known for k in range(len(OTHER_SIZES))]
+        tasks = [
+            self._task(f"retry-{k}", item.key, retry_candidate, (screened_document(item.screened), OTHER_SIZES[k]))
+            for item, k in pairs
+        ]
+        values = self._run("trying other sizes", tasks, 0.75)
+        ends = {item.key: [item] for item in known}
+        for (item, _), value in zip(pairs, values, strict=True):
+            if value is not None:
+                ends[item.key].append(self._rival(item.screened, value, without))
+        return [min(own, key=lambda item: item.standing.cost) for own in ends.values()]
+
+    def _rival(self, screened: Screened, value: Json, without: FloatArray) -> Rival:
+        standing, costs = restored(value["standing"], (Standing,)), restored(value["costs"])
+        return Rival(screened, standing, without - costs, partial(seat_candidate, self.bench, screened, value["point"]))
+
+    def _task(self, what: str, key: tuple[str, str], function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
+        return Task(f"{self.number}-{what}-{key[0]}-{key[1]}", function, arguments)
+
+    def _run(self, what: str, tasks: Sequence[Task], begin: float) -> list[Json]:
+        def watch(tally: Tally) -> None:
+            self.tell(f"{what}: {tally.done} of {tally.total}", begin + 0.25 * tally.done / max(tally.total, 1))
+
+        bench, run = self.bench, self.execution
+        outcomes = run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch)
+        return [value_of(outcome) for outcome in outcomes.values()]
+
+
+def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
+    """Test an effect at a place; null where the drive with it cannot be simulated."""
+    return _tested(bench, bench.current, bench.blocks, effect, place)
+
+
+def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
+    """Test an effect at a place with all parameters at their guesses; null where that cannot be simulated."""
+    start = bench.unfitted
+    return None if start is None else _tested(bench, start, bench.unfitted_blocks, effect, place)
+
+
+def _tested(bench: Bench, start: FittedModel, blocks: Blocks, effect: str, place: str) -> Json:
+    seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
+    return None if seen is None else screened_document(seen)
+
+
+def held_out_costs(bench: Bench) -> Json:
+    """Return (blocks,) costs of the current model on recordings left out."""
+    return plain(bench.blocks.sums(held_out(bench.current)))
+
+
+def refit_candidate(bench: Bench, content: Json) -> Json:
+    """Refit a candidate, a few steps; null where its simulation breaks down."""
+    return _refitted(bench.current, restored_screened(bench, content))
+
+
+def refit_unfitted(bench: Bench, content: Json) -> Json:
+    """Refit a candidate from the guesses, a few steps; null where its simulation breaks down."""
+    assert bench.unfitted is not None
+    return _refitted(bench.unfitted, restored_screened(bench, content))
+
+
+def _refitted(start: FittedModel, item: Screened) -> Json:
+    fitted = quick_refit(start, item)
+    return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
+
+
+def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
+    """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
+    return _judged(bench, completed(seat_candidate(bench, restored_screened(bench, content), point)))
+
+
+def retry_candidate(bench: Bench, content: Json, scale: float) -> Json:
+    """Do the same from a multiple of the predicted size; null where the simulation breaks down."""
+    fitted = completed(begun_at_size(bench.current, restored_screened(bench, content), scale))
+    return _judged(bench, fitted) if fitted.holds else None
+
+
+def _judged(bench: Bench, fitted: FittedModel) -> Json:
+    costs = blocks_like(bench.current, fitted, bench.blocks)
+    standing = Standing.of(fitted, bench.standard.is_material(fitted))
+    return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
+
+
+def seat_candidate(bench: Bench, item: Screened, point: Json) -> FittedModel:
+    """Return the refit of a candidate where it stands."""
+    return seated(with_drive(bench.current.model, item.augmentation.drive), bench.current.footing, point)
+
+
+def screened_document(item: Screened) -> Json:
+    """Return a score test without its drive, which effect and place bring back."""
+    return plain({part.name: getattr(item, part.name) for part in fields(item) if part.name != "augmentation"})
+
+
+def restored_screened(bench: Bench, content: Json) -> Screened:
+    """Return the score test with its drive."""
+    found: Mapping[str, Any] = restored(content, (Start, Trial))
+    drive = bench.current.model.problem.drive
+    augmentation: Augmentation = effects()[found["effect"]].addition(drive, found["component"], bench.clues)
+    return Screened(**found, augmentation=augmentation)
