@@ -29,12 +29,13 @@ from friction_ocp.diagnosis.worth import (
     shortlist,
     with_resembling,
 )
+from friction_ocp.effects.registry import effects
 from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
 FINISHED, CLOSE = 2, 1.5
 """Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
-this factor. As many begin again at other sizes where that leads nowhere."""
+this factor; and what resembles the best. As many begin again at other sizes where that leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is."""
@@ -237,11 +238,13 @@ def _completed(
     hopes = [min(refit.cost, current.cost - refit.screened.gain) for refit in refits]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
     order = sorted(range(len(hopes)), key=lambda k: hopes[k])
-    pairs = [refits[k] for k in order]
-    rivals = crew.rivals(pairs[:count], without)
+    alike = effects()[refits[order[0]].key[0]].resembles
+    first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
+    others = [k for k in order if k not in first]
+    rivals = crew.rivals([refits[k] for k in first], without)
     yield rivals
-    if len(pairs) > count:
-        rivals = [*rivals, *crew.rivals(pairs[count:], without)]
+    if others:
+        rivals = [*rivals, *crew.rivals([refits[k] for k in others], without)]
         yield rivals
     rivals.sort(key=lambda item: item.standing.cost)
     again = [item for item in rivals if current.cost - item.standing.cost >= enough and item.screened.starts][:FINISHED]

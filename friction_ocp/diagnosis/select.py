@@ -184,8 +184,8 @@ def shown(aliases: Sequence[Rival]) -> tuple[Rival, ...]:
     """Return the members of an alias set that are worth naming.
 
     Of those that leave the same residuals as the best, only the one that says something else: another effect, and at
-    another component where there is one. The others are no further explanations but the same one in other words. Nor is
-    one that has all that another has, and more.
+    another component where there is one. The others are no further explanations but the same one in other words; so is
+    the same effect elsewhere, beside a rival that differs. Nor is one that has all that another has, and more.
     """
     if not aliases:
         return ()
@@ -196,7 +196,8 @@ def shown(aliases: Sequence[Rival]) -> tuple[Rival, ...]:
     different = sorted(
         same, key=lambda rival: (rival.key[0] == best.key[0], _blames_sensor(rival), rival.key[1] == best.key[1])
     )
-    return (best, *different[:1], *others)
+    twin = [rival for rival in different[:1] if not others or rival.key[0] != best.key[0]]
+    return (best, *twin, *others)
 
 
 def _weights(totals: FloatArray) -> FloatArray:

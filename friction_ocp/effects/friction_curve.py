@@ -58,6 +58,7 @@ class StribeckEffect(AbstractEffect):
 
     name: ClassVar[str] = "stribeck"
     sentence: ClassVar[str] = "friction falls with speed near standstill"
+    resembles: ClassVar[tuple[str, ...]] = ("polyline_break",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         for shaft in moving_shafts(drive):
@@ -97,6 +98,7 @@ class PolylineBreakEffect(AbstractEffect):
 
     name: ClassVar[str] = "polyline_break"
     sentence: ClassVar[str] = "the viscous slope changes at a speed"
+    resembles: ClassVar[tuple[str, ...]] = ("stribeck",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         for shaft in moving_shafts(drive):

@@ -66,6 +66,14 @@ def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
     assert shown((disc, here)) == (disc, here)
 
 
+def test_the_same_effect_elsewhere_stands_back_behind_a_rival() -> None:
+    """Where a rival differs, naming one effect at two components that are the same would make three of two answers."""
+    arm, motor = rival("constant_torque", "arm", {"a": 0.0}), rival("constant_torque", "motor", {"b": 0.0})
+    other = rival("asymmetry", "motor", {"c": 0.0}, gain=4.0)
+    assert shown((arm, motor)) == (arm, motor)
+    assert shown((arm, motor, other)) == (arm, other)
+
+
 def test_another_of_an_alias_set_can_be_accepted() -> None:
     """It takes the place and the probability of the first, and those that leave the same residuals stand with it."""
     one, other = rival("stribeck", "motor", {"a": 0.0}, gain=5.0), rival("cogging", "motor", {"b": 0.0}, gain=2.0)
