@@ -183,18 +183,13 @@ def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> Fl
 
 
 def open_bench(problem: Problem, execution: Execution) -> Bench:
-    """Fit the base model, then try to better it."""
-    bench = first_bench(problem, execution)
-    better = bettered(bench, execution)
-    return replace(better, base_point=better.seat.point)
-
-
-def first_bench(problem: Problem, execution: Execution) -> Bench:
-    """Fit the base model in this process, or read its end from the output folder."""
+    """Fit the base model in this process, or read its end from the output folder; then try to better it."""
     workshop, task = Workshop(problem), Task("base", fit_base_model)
     with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
     found = value_of(with_one["base"])
-    return Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    better = bettered(bench, execution)
+    return replace(better, base_point=better.seat.point)
 
 
 def bettered(bench: Bench, execution: Execution) -> Bench:

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from friction_ocp.diagnosis.bench import Tell, first_bench, open_bench
+from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.crew import screen_candidate
@@ -14,15 +14,12 @@ from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
 from friction_ocp.diagnosis.options import Considered, considered, level_of
-from friction_ocp.diagnosis.reading import explains_more, other_reading
+from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, corrected
-from friction_ocp.diagnosis.worth import (
-    Key,
-    innovations,
-)
+from friction_ocp.diagnosis.worth import Key, innovations
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.statistics.execution import Execution
@@ -138,7 +135,8 @@ def diagnose(
     if other is None or not stated.gap:
         return stated
     tell("the inputs read the other way", 0.0)
-    if not explains_more(first_bench(other, execution).base, stated.final, stated.accepted, stated.left_over):
+    base = read_otherwise(other, stated.base)
+    if not base.holds or not explains_more(base, stated.final, stated.accepted, stated.left_over):
         return stated
     read = _diagnosed(other, tell, execution)
     simpler = not read.left_over and (stated.left_over or len(read.accepted) < len(stated.accepted))

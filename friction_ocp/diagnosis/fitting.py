@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -48,6 +48,8 @@ NUDGE, CLOSE_BY = 0.05, 1.2
 one up to which it goes on."""
 UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
+NEGLIGIBLE = 0.05
+"""The same for one of several steps of the nodes."""
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,7 @@ def joined(program: Program, point: Point) -> Point:
     """Return the point with nodes that go on from where the segments before them end, as long as that leads on."""
     cost = program.objective(point)
     for _ in range(MOST_TURNS):
-        trial = solve_nodes(program, carried_on(program, point), STEPS_OF_NODES)
+        trial = solve_nodes(program, carried_on(program, point), STEPS_OF_NODES, NEGLIGIBLE)
         after = program.objective(trial)
         if not after < cost - UNIMPORTANT:
             break
@@ -305,27 +307,37 @@ def freed(fitted: FittedModel) -> FittedModel:
     program, point = fitted.linear.program, fitted.linear.point
     beyond = around_kinks(fitted.model, program, point, WARM)
     best = beyond.point if beyond.objective < fitted.objective else point
-    for _ in range(MOST_TURNS):
-        moved = unstuck(fitted.model, program, best)
-        if moved is best:
-            break
-        best = solve_gauss_newton(program, moved, WARM).point
+    best = unstuck(fitted.model, program, best)
     return fitted if best is point else replace(fitted, linear=linear_program(program, best))
 
 
 def unstuck(model: Model, program: Program, point: Point) -> Point:
-    """Return the point with other nodes where fresh ones, or friction with a hardly smoothed sign, lead to better."""
-    best = _with_better(program, point, begun(program, point.theta))
-    for width in HARDLY:
-        rounded = replace(program, width=width * model.speed_scale)
-        beyond = solve_nodes(program, solve_nodes(rounded, best, NODE_STEPS), NODE_STEPS)
-        best = _with_better(program, best, beyond)
-    return best
+    """Return where fresh nodes, or those that friction with a hardly smoothed sign leads to, lead on to in turn."""
+    ways: list[Callable[[Program, Point], Point]] = [_fresh, *(partial(_rounded, model, width) for width in HARDLY)]
+    idle = 0
+    for turn in range(MOST_TURNS * len(ways)):
+        moved = _with_better(program, point, ways[turn % len(ways)](program, point))
+        idle = idle + 1 if moved is point else 1
+        if moved is not point:
+            point = solve_gauss_newton(program, moved, WARM).point
+        if idle == len(ways):
+            break
+    return point
+
+
+def _fresh(program: Program, point: Point) -> Point:
+    return begun(program, point.theta)
+
+
+def _rounded(model: Model, width: float, program: Program, point: Point) -> Point:
+    """Return the point with nodes that friction with a hardly smoothed sign leads to."""
+    rounded = replace(program, width=width * model.speed_scale)
+    return solve_nodes(program, solve_nodes(rounded, point, NODE_STEPS, NEGLIGIBLE), NODE_STEPS, NEGLIGIBLE)
 
 
 def _with_better(program: Program, point: Point, other: Point) -> Point:
     """Return the point with the better stretches of nodes of another, where that is worth a step."""
-    trial = joined(program, solve_nodes(program, spliced(program, point, other), STEPS_OF_NODES))
+    trial = joined(program, solve_nodes(program, spliced(program, point, other), STEPS_OF_NODES, NEGLIGIBLE))
     return trial if program.objective(trial) < program.objective(point) - UNIMPORTANT else point
 
 
@@ -346,7 +358,8 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
     """Fit a drive that lacks something that the current model has."""
     model = with_drive(current.model, drive)
-    return freed(timed(polished(model, current.footing, model.space.with_known(current.values), None)))
+    fitted = timed(polished(model, current.footing, model.space.with_known(current.values), None))
+    return fitted if fitted.astray and not current.astray else freed(fitted)
 
 
 def around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:

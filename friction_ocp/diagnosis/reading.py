@@ -9,11 +9,13 @@ import numpy as np
 
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT
-from friction_ocp.diagnosis.fitting import FittedModel, polished
+from friction_ocp.diagnosis.fitting import FittedModel, freed, polished, timed
+from friction_ocp.diagnosis.footing import training_pieces
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects
-from friction_ocp.estimation.model import with_drive
+from friction_ocp.estimation.horizon import judged_alike
+from friction_ocp.estimation.model import late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 
 _DRIVING = ("current", "current_command", "torque", "voltage")
@@ -42,6 +44,13 @@ def corrections(stated: Problem, read: Problem) -> list[str]:
         for item in read.drive.channels
         if item.hold != before[item.name]
     ]
+
+
+def read_otherwise(problem: Problem, fitted: FittedModel) -> FittedModel:
+    """Return a base model fitted to inputs that are read as another problem says, from where it stands."""
+    model = with_late(judged_alike(prepare(problem)), late_of(fitted.model))
+    foot = replace(fitted.footing, train=training_pieces(model))
+    return freed(timed(polished(model, foot, fitted.theta, None)))
 
 
 def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool) -> bool:

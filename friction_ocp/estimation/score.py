@@ -102,8 +102,8 @@ NOTHING, RELATIVE = 1e-3, 1e-9
 """Decrease of the objective below which a step gained nothing: in units of log-likelihood, and of the objective."""
 
 
-def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
-    """Solve for the node states with the parameters held."""
+def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible: float = NOTHING) -> Point:
+    """Solve for the node states with the parameters held, until a step gains next to nothing of log-likelihood."""
     if program.without_nodes:
         return point
     still, system = np.zeros_like(point.theta), program.linearise(point)
@@ -112,7 +112,7 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15) -> Point:
         steps = reduce_system(system, damping).node_steps(still)
         trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))
         after = program.objective(trial)
-        nothing = max(NOTHING, RELATIVE * objective)
+        nothing = max(negligible, RELATIVE * objective)
         if not after < objective:
             if after - objective < nothing:
                 break  # at a kink, or at the end
