@@ -3,13 +3,14 @@ found to be what the recordings cannot tell from it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import blocks_like
+from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, without_addition
 from friction_ocp.diagnosis.held_out import folds, held_out
@@ -17,39 +18,40 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import Key, required
+from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import with_drive
+from friction_ocp.execution.run import run_tasks
+from friction_ocp.execution.task import Json, Task
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.statistics.execution import Execution
 
 TRIED = 2
 """Rivals of an earlier addition, best first, that are tried in its place."""
 
 
 def without_superfluous(
-    base: FittedModel, current: FittedModel, accepted: list[Key], level: float, rng: np.random.Generator
+    bench: Bench, accepted: list[Key], level: float, rng: np.random.Generator, run: Execution
 ) -> tuple[FittedModel, list[Key]]:
     """Drop earlier additions that the latest one has made superfluous on recordings left out.
 
     Superfluous is what neither gains for certain there nor is worth an addition in sum.
     """
-    benchmark = _Benchmark(current)
-    for key in dict.fromkeys(accepted[:-1]):
-        kept = [other for other in accepted if other != key]
-        simpler = without_addition(current, with_additions(base, kept))
-        if not simpler.holds:
+    current, benchmark = bench.current, _Benchmark(bench.current)
+    earlier = list(dict.fromkeys(accepted[:-1]))
+    known = _fits(bench, run, {key: _Wanted(_less(accepted, key)) for key in earlier})
+    for key in earlier:
+        kept = _less(accepted, key)
+        simpler = known[key] if current is bench.current else without_addition(current, _drive(bench, kept))
+        if simpler is None or not simpler.holds:
             continue
         gains = benchmark.dearer(simpler)
-        if not benchmark.certain(gains, level, rng) and float(np.sum(gains)) < required(base, simpler):
+        if not benchmark.certain(gains, level, rng) and float(np.sum(gains)) < required(bench.base, simpler):
             current, accepted, benchmark = simpler, kept, _Benchmark(simpler)
     return current, accepted
 
 
 def exchanged(
-    base: FittedModel,
-    current: FittedModel,
-    rounds: Sequence[Round],
-    accepted: list[Key],
-    level: float,
-    rng: np.random.Generator,
+    bench: Bench, rounds: Sequence[Round], accepted: list[Key], level: float, rng: np.random.Generator, run: Execution
 ) -> tuple[FittedModel, list[Round], list[Key]]:
     """Put rivals in the place of earlier additions where, beside the later ones, they explain more for certain.
 
@@ -57,7 +59,14 @@ def exchanged(
     that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed again:
     beside all that was missing then a small difference looked like a large one.
     """
-    done, benchmark = list(rounds), _Benchmark(current)
+    done, current, benchmark = list(rounds), bench.current, _Benchmark(bench.current)
+    wanted = dict[tuple[Key, Key], _Wanted]()
+    for item in done[:-1]:
+        held = item.accepted
+        if held is not None and accepted.count(held.key) == 1:
+            for rival in _others(item.choice, accepted):
+                wanted[held.key, rival.key] = _Wanted(_swapped(accepted, held, rival), rival.standing.values)
+    known = _fits(bench, run, wanted)
     for index, item in enumerate(done[:-1]):
         held = item.accepted
         if held is None or accepted.count(held.key) != 1:
@@ -67,9 +76,12 @@ def exchanged(
         while others:
             rival = others.pop(0)
             seen.add(rival.key)
-            keys = [rival.key if other == held.key else other for other in accepted]
-            swapped = _fitted(base, current, rival, keys)
-            if not swapped.holds:
+            keys = _swapped(accepted, held, rival)
+            if current is bench.current and (held.key, rival.key) in known:
+                swapped = known[held.key, rival.key]
+            else:
+                swapped = _fitted(bench, current, keys, rival.standing.values)
+            if swapped is None or not swapped.holds:
                 continue
             gains = -benchmark.dearer(swapped)
             more = swapped.cost < current.cost and benchmark.certain(gains, level, rng)
@@ -87,21 +99,76 @@ def exchanged(
     return current, done, accepted
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Additions to fit together: what is left of the current ones, or them with one exchanged."""
+
+    keys: list[Key]
+    alone: Mapping[str, float] | None = None
+    """Where the one that is exchanged ended by itself."""
+
+
+def _less(accepted: Sequence[Key], key: Key) -> list[Key]:
+    return [other for other in accepted if other != key]
+
+
+def _swapped(accepted: Sequence[Key], held: Rival, rival: Rival) -> list[Key]:
+    return [rival.key if other == held.key else other for other in accepted]
+
+
+def _drive(bench: Bench, keys: Sequence[Key]) -> Drive:
+    return with_additions(bench.base, keys)
+
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+def _fits(bench: Bench, run: Execution, wanted: Mapping[Name, _Wanted]) -> dict[Name, FittedModel | None]:
+    """Return fits of other additions than those of the bench, worked out beside one another; None of what broke down.
+
+    They are set up again when they are looked at, which all of them are.
+    """
+    tasks = {
+        name: Task(f"instead-{k}", fit_instead, (tuple(item.keys), item.alone))
+        for k, (name, item) in enumerate(wanted.items())
+    }
+    if not tasks:
+        return {}
+    outcomes = run_tasks(
+        "examining additions again", list(tasks.values()), bench, bench.fingerprint, run.executor, run.ledger
+    )
+    found = dict[Name, FittedModel | None]()
+    for name, item in wanted.items():
+        point = value_of(outcomes[tasks[name].key])
+        model = with_drive(bench.base.model, _drive(bench, item.keys))
+        found[name] = None if point is None else seated(model, bench.base.footing, point)
+    return found
+
+
+def fit_instead(bench: Bench, keys: Sequence[Key], alone: Mapping[str, float] | None) -> Json:
+    """Fit other additions than those of the bench; the value says where, null where the simulation breaks down."""
+    if alone is None:
+        fitted = without_addition(bench.current, _drive(bench, keys))
+    else:
+        fitted = _fitted(bench, bench.current, keys, alone)
+    return point_document(fitted) if fitted.holds else None
+
+
 def _others(choice: Choice, known: Sequence[Key]) -> list[Rival]:
     others = [rival for rival in choice.rivals if rival.key not in known]
     return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
 
 
-def _fitted(base: FittedModel, current: FittedModel, rival: Rival, keys: Sequence[Key]) -> FittedModel:
-    """Fit the base model with some additions, from where the rival ended and what the later ones are now.
+def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:
+    """Fit the base model with some additions, from where one of them ended by itself and what the others are now.
 
-    Or from where all but the rival are now, if that is nearer.
+    Or from where all but that one are now, if that is nearer.
     """
-    model = with_drive(base.model, with_additions(base, keys))
-    alone = rival.standing.values
+    model = with_drive(bench.base.model, _drive(bench, keys))
     starts = [{**current.values, **alone}, {**alone, **current.values}]
-    ends = [polished(model, base.footing, model.space.with_known(known), None) for known in starts]
-    return completed(min(ends, key=lambda end: end.objective))
+    ends = [polished(model, bench.base.footing, model.space.with_known(known), None) for known in starts]
+    best = min(ends, key=lambda end: end.objective)
+    return best if best.astray and not current.astray else completed(best)
 
 
 def _weighed_again(

@@ -138,15 +138,14 @@ class Search:
     def _take(self, rival: Rival) -> None:
         """Add what a round has found; drop or exchange earlier additions that it makes superfluous."""
         self.tell("examining earlier additions again", 0.0)
-        base, keys = self.bench.base, [*self.accepted, rival.key]
-        current, self.accepted = without_superfluous(base, rival.fitted, keys, self.level, self.rng)
-        self.bench = self.bench.at(current)
+        bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
+        current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
+        self.bench = bench.at(current)
         if innovations(current).significant(self.level):
             self._exchange()
 
     def _exchange(self) -> None:
-        base, current = self.bench.base, self.bench.current
-        found = exchanged(base, current, self.rounds, self.accepted, self.level, self.rng)
+        found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)
         current, self.rounds, self.accepted = found
         self.bench = self.bench.at(current)
 

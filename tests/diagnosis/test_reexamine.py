@@ -29,6 +29,7 @@ from friction_ocp.problem_file.load import load_problem
 from friction_ocp.problem_file.write import write_problem
 from friction_ocp.statistics.execution import Execution
 
+HERE = Execution(InProcess())
 LEVEL = 0.01
 
 
@@ -55,7 +56,7 @@ def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None
     cogging = PlantRipple(3.1, (0.05 * TORQUE_CONSTANT,), (0.0,))
     plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
     names = ("polyline_break", "quadratic_drag", "cogging")
-    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), Execution(InProcess()))
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), HERE)
     wrong, right, other = ((name, "motor") for name in names)
     rounds = list[Round]()
     for keys in ([wrong, right], [other]):
@@ -64,14 +65,15 @@ def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None
         assert accepted is not None
         bench = bench.at(accepted.fitted)
     rng = np.random.default_rng(0)
-    current, told, kept = exchanged(bench.base, bench.current, rounds, [wrong, other], LEVEL, rng)
+    current, told, kept = exchanged(bench, rounds, [wrong, other], LEVEL, rng, HERE)
     assert kept == [right, other] and current.cost < bench.current.cost
     first = told[0]
     assert first.accepted is not None and first.accepted.key == right
     assert [item.key for item in first.choice.aliases] == [right] and first.choice.rivals[0].key == right
     assert sum(first.choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
-    again = exchanged(bench.base, current, told, kept, LEVEL, rng)
-    assert again[2] == kept and again[0] is current
+    after = bench.at(current)
+    again = exchanged(after, told, kept, LEVEL, rng, HERE)
+    assert again[2] == kept and again[0] is after.current
 
 
 def test_gravity_that_is_added_does_not_change_over_what_time_runs_are_judged(tmp_path: Path) -> None:
@@ -109,7 +111,7 @@ def test_rivals_are_weighed_again_beside_what_came_later(tmp_path: Path) -> None
     cogging = PlantRipple(3.1, (0.2 * TORQUE_CONSTANT,), (0.0,))
     plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
     names = ("constant_torque", "asymmetry", "unbalance", "cogging")
-    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), Execution(InProcess()))
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), HERE)
     constant, differing, gravity, other = ((name, "motor") for name in names)
     rounds, accepted = list[Round](), list[Key]()
     for keys in ([constant, differing, gravity], [other]):
@@ -118,7 +120,7 @@ def test_rivals_are_weighed_again_beside_what_came_later(tmp_path: Path) -> None
         assert done is not None
         bench, accepted = bench.at(done.fitted), [*accepted, done.key]
     assert gravity in [item.key for item in rounds[0].choice.aliases]
-    current, told, kept = exchanged(bench.base, bench.current, rounds, accepted, LEVEL, np.random.default_rng(0))
+    current, told, kept = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
     first = told[0].choice
     assert {item.key for item in first.aliases} == {item.key for item in first.same} == {constant, differing}
     assert kept == [first.rivals[0].key, other] == [first.aliases[0].key, other]
