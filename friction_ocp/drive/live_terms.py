@@ -60,6 +60,7 @@ def _motor(motor: Motor) -> Motor:
         cogging=_live(motor.cogging),
         torque_ripple=_live(motor.torque_ripple),
         lag=_on(motor.lag),
+        dead_time=_on(motor.dead_time),
         saturation=_on(motor.saturation),
         saturation_sharpness=None if plain else motor.saturation_sharpness,
     )

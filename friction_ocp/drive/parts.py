@@ -162,7 +162,8 @@ SHARPNESS = 2.0
 class Motor:
     """An electric motor on a shaft; its back-EMF constant equals its torque constant.
 
-    What drives it (current, torque or voltage) follows its command with the time constant `lag`. The torque that a
+    What drives it (current, torque or voltage) follows its command with the time constant `lag`, and all that is seen
+    of the drive is later than that by `dead_time`. The torque that a
     current i would make is divided by (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the
     torque over the torque constant where torque drives it.
     """
@@ -176,6 +177,7 @@ class Motor:
     cogging: Cogging | None = None
     torque_ripple: TorqueRipple | None = None
     lag: Value = quantity("time", "time constant with which the motor follows its command", 0.0)
+    dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
 

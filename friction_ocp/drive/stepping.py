@@ -34,6 +34,7 @@ from friction_ocp.drive.torques import loops_after
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.friction.smoothing import expm1, tanh, where
 from friction_ocp.kept import kept
+from friction_ocp.parameters import is_off
 
 INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
@@ -319,7 +320,8 @@ def stepped(drive: Drive) -> SteppedDrive:
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
     y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
-    late = {channel.name for channel in drive.outputs if channel.delay != 0.0 or channel.clock}
+    dead = any(not is_off(motor.dead_time) for motor in drive.motors)
+    late = {channel.name for channel in drive.outputs if dead or channel.delay != 0.0 or channel.clock}
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width, late)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
     return SteppedDrive(

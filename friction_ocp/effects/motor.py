@@ -16,6 +16,12 @@ def _motors(drive: Drive) -> list[Motor]:
     return [motor for motor in drive.motors if any(shaft.name == motor.shaft for shaft in drive.shafts)]
 
 
+def _shows_dead_time(drive: Drive) -> bool:
+    """Whether a command that is acted on late is more than a late sensor: it makes several late by the same time."""
+    alone = len(drive.motors) == 1 and drive.controller is None
+    return alone and is_off(drive.motors[0].dead_time) and len(drive.outputs) > 1
+
+
 class DriveLagEffect(AbstractEffect):
     """The torque follows the command late."""
 
@@ -31,8 +37,13 @@ class DriveLagEffect(AbstractEffect):
         assert motor is not None
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{motor.name}.lag"
         times = [step, 5.0 * step, 25.0 * step]
-        added = change_motor(drive, motor.name, lag=Free(times[0], 1e-3 * step, 1e3 * step))
-        return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in times))
+        lag = Free(times[0], 1e-3 * step, 1e3 * step)
+        if not _shows_dead_time(drive):
+            added = change_motor(drive, motor.name, lag=lag)
+            return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in times))
+        dead = f"{motor.name}.dead_time"
+        added = change_motor(drive, motor.name, lag=lag, dead_time=Free(0.1 * step, 0.0, 100.0 * step))
+        return Augmentation(added, {path: 0.0, dead: 0.0}, tuple(Trial(({path: one}, {dead: step})) for one in times))
 
 
 class TorqueSaturationEffect(AbstractEffect):

@@ -14,7 +14,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import parse, resolve_ties
-from friction_ocp.parameters import Free, Leaf, Tie
+from friction_ocp.parameters import Free, Leaf, Tie, is_off
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 ROUNDING = 1e-9
@@ -156,6 +156,12 @@ def _table(
     resolved = resolve_ties(ties, table)
     if drive.controller is not None and f"{drive.controller.feedback}.delay" in resolved:
         resolved[FEEDBACK_DELAY] = resolved[f"{drive.controller.feedback}.delay"]
+    for motor in drive.motors:
+        if not is_off(motor.dead_time):  # a command that is acted on later is a drive that is seen later
+            for channel in drive.outputs:
+                resolved[f"{channel.name}.delay"] = (
+                    resolved[f"{channel.name}.delay"] + resolved[f"{motor.name}.dead_time"]
+                )
     if isinstance(use, RecordingUse):  # what is undone in the recording already is not the model's to do
         for channel, seconds in use.late.items():
             resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds

@@ -111,6 +111,7 @@ class MotorSection(Section):
     cogging: CoggingTerm = None
     torque_ripple: TorqueRippleTerm = None
     lag: Number = 0.0
+    dead_time: Number = 0.0
     saturation: Number = 0.0
     saturation_sharpness: Number = SHARPNESS
 

@@ -16,7 +16,7 @@ _POSITIVE = {
     *("resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"),
     *("width", "period", "time_constant", "twist", "saturation_sharpness"),
 }
-_NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag"}
+_NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
