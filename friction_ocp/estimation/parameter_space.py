@@ -158,10 +158,9 @@ def _table(
         resolved[FEEDBACK_DELAY] = resolved[f"{drive.controller.feedback}.delay"]
     for motor in drive.motors:
         if not is_off(motor.dead_time):  # a command that is acted on later is a drive that is seen later
+            dead, resolved[f"{motor.name}.dead_time"] = resolved[f"{motor.name}.dead_time"], 0.0
             for channel in drive.outputs:
-                resolved[f"{channel.name}.delay"] = (
-                    resolved[f"{channel.name}.delay"] + resolved[f"{motor.name}.dead_time"]
-                )
+                resolved[f"{channel.name}.delay"] = resolved[f"{channel.name}.delay"] + dead
     if isinstance(use, RecordingUse):  # what is undone in the recording already is not the model's to do
         for channel, seconds in use.late.items():
             resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds
