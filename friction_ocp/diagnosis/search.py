@@ -34,8 +34,9 @@ from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
 FINISHED, CLOSE = 2, 1.5
-"""Candidates whose refit is completed: the best after a few steps or by prediction, and all whose objective is within
-this factor; and what resembles the best. As many begin again at other sizes where that leads nowhere."""
+"""Candidates whose refit is completed: the best after a few steps or by prediction, which leaves noise at least, and
+all whose objective is within this factor; and what resembles the best. As many begin again at other sizes where that
+leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is."""
@@ -198,7 +199,7 @@ class Search:
         unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
-        for rivals in _completed(crew, chosen, unfitted, known, enough):
+        for rivals in completed_rivals(crew, chosen, unfitted, known, enough):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)
@@ -215,7 +216,7 @@ def _promising(found: Sequence[Screened]) -> list[Screened]:
     return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
 
 
-def _completed(
+def completed_rivals(
     crew: Crew,
     chosen: Sequence[Screened],
     unfitted: Sequence[Screened],
@@ -234,9 +235,10 @@ def _completed(
     if not refits:
         return
     current = crew.bench.current
-    hopes = [min(refit.cost, current.cost - refit.screened.gain) for refit in refits]
+    noise = 0.5 * samples(current)
+    hopes = [min(refit.cost, max(current.cost - refit.screened.gain, noise)) for refit in refits]
     count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
-    order = sorted(range(len(hopes)), key=lambda k: hopes[k])
+    order = sorted(range(len(hopes)), key=lambda k: (hopes[k], refits[k].cost))
     alike = effects()[refits[order[0]].key[0]].resembles
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]

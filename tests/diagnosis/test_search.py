@@ -1,0 +1,53 @@
+"""Which of the candidates that were refitted a few steps are refitted to their end."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from friction_ocp.diagnosis.crew import Crew, Refit
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.diagnosis.search import completed_rivals
+from friction_ocp.effects.effect import Augmentation
+
+SAMPLES, COST = 1000, 3000.0
+"""The noise of the samples makes 500 of the cost."""
+DRIVE: Any = None
+
+
+def completed(*tried: tuple[str, float, float]) -> list[list[str]]:
+    """Return the effects whose refits are completed, turn by turn, from (effect, predicted gain, cost after steps)."""
+    screened = [Screened(effect, "motor", gain, 0.0, (), Augmentation(DRIVE, {}, ())) for effect, gain, _ in tried]
+    refits = [Refit(item, None, cost) for item, (_, _, cost) in zip(screened, tried, strict=True)]
+    rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
+    current = SimpleNamespace(cost=COST, linear=SimpleNamespace(rows=rows))
+    turns = list[list[str]]()
+
+    def rivals(some: list[Refit], without: Any) -> list[Rival]:
+        turns.append([refit.key[0] for refit in some])
+        return [cast(Any, SimpleNamespace(standing=SimpleNamespace(cost=refit.cost), screened=0)) for refit in some]
+
+    def without(shortlist: list[Screened], unfitted: list[Screened]) -> tuple[None, list[Refit]]:
+        return None, refits
+
+    crew = SimpleNamespace(bench=SimpleNamespace(current=current), without=without, rivals=rivals)
+    found = completed_rivals(cast(Crew, crew), screened, [], {item.key: item for item in screened}, np.inf)
+    list(found)
+    return turns
+
+
+def test_a_prediction_beyond_noise_promises_no_more_than_noise() -> None:
+    """What explains everything in a few steps is not passed over for what was predicted to explain more than that."""
+    turns = completed(("asymmetry", 2600.0, 510.0), ("unbalance", 3100.0, 515.0), ("constant_torque", 2400.0, 505.0))
+    assert set(turns[0]) == {"asymmetry", "unbalance", "constant_torque"}
+
+
+def test_the_best_come_first_and_the_others_if_those_will_not_do() -> None:
+    """By what a few steps or the prediction leave; what resembles the best comes with it."""
+    turns = completed(("cogging", 2400.0, 2000.0), ("unbalance", 100.0, 700.0), ("warm_up", 50.0, 2900.0))
+    assert turns == [["cogging", "unbalance"], ["warm_up"]]
+    turns = completed(("stribeck", 2400.0, 600.0), ("cogging", 0.0, 700.0), ("polyline_break", 50.0, 2900.0))
+    assert turns == [["stribeck", "cogging", "polyline_break"]]
