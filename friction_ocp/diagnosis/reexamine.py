@@ -12,7 +12,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, polished, without_addition
+from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, completed, polished, without_addition
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.rival import Rival, is_same
@@ -84,12 +84,14 @@ def exchanged(
             if swapped is None or not swapped.holds:
                 continue
             gains = -benchmark.dearer(swapped)
-            more = swapped.cost < current.cost and benchmark.certain(gains, level, rng)
+            more = swapped.cost < current.cost - UNIMPORTANT and benchmark.certain(gains, level, rng)
             if more or benchmark.simpler(swapped):
                 seen.add(held.key)
+                former = [held.refitted(current, gains), *tried]
                 held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
                 item = replace(item, accepted=rival, choice=turned(item.choice, rival))
-                tried, others = list[Rival](), _others(item.choice, [*accepted, *seen])
+                tried = [other.refitted(other.fitted, -benchmark.dearer(other.fitted)) for other in former]
+                others = _others(item.choice, [*accepted, *seen])
             else:
                 tried.append(rival.refitted(swapped, gains))
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)

@@ -105,8 +105,9 @@ def test_bristles_are_found_with_their_damping(tmp_path: Path) -> None:
     assert found.final.values["motor.friction.bristle.sigma1"] == pytest.approx(damping, rel=0.1)
 
 
-def test_rivals_are_weighed_again_beside_what_came_later(tmp_path: Path) -> None:
-    """Dry friction that differs by direction remains what a constant torque may be; gravity goes."""
+@pytest.mark.parametrize("first", ["constant_torque", "unbalance"])
+def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: Path) -> None:
+    """Dry friction that differs by direction remains what a constant torque may be; gravity goes, accepted or not."""
     plant = axis(tau_c=(1.1 * COULOMB, 0.9 * COULOMB))
     cogging = PlantRipple(3.1, (0.2 * TORQUE_CONSTANT,), (0.0,))
     plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
@@ -114,17 +115,18 @@ def test_rivals_are_weighed_again_beside_what_came_later(tmp_path: Path) -> None
     bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), HERE)
     constant, differing, gravity, other = ((name, "motor") for name in names)
     rounds, accepted = list[Round](), list[Key]()
-    for keys in ([constant, differing, gravity], [other]):
+    alike = sorted([constant, differing, gravity], key=lambda key: key[0] != first)
+    for keys in (alike, [other]):
         rounds.append(round_of(bench, keys))
         done = rounds[-1].accepted
         assert done is not None
         bench, accepted = bench.at(done.fitted), [*accepted, done.key]
     assert gravity in [item.key for item in rounds[0].choice.aliases]
     current, told, kept = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
-    first = told[0].choice
-    assert {item.key for item in first.aliases} == {item.key for item in first.same} == {constant, differing}
-    assert kept == [first.rivals[0].key, other] == [first.aliases[0].key, other]
-    chances = dict(zip((item.key for item in first.rivals), first.probabilities, strict=True))
+    choice = told[0].choice
+    assert {item.key for item in choice.aliases} == {item.key for item in choice.same} == {constant, differing}
+    assert kept == [choice.rivals[0].key, other] == [choice.aliases[0].key, other]
+    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
     assert chances[gravity] < LEVEL < chances[differing] < chances[constant]
     assert sum(chances.values()) == pytest.approx(sum(rounds[0].choice.probabilities))
     assert current.cost < rounds[0].before.cost
