@@ -177,9 +177,9 @@ class Motor:
     cogging: Cogging | None = None
     torque_ripple: TorqueRipple | None = None
     lag: Value = quantity("time", "time constant with which the motor follows its command", 0.0)
-    dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
+    dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
 
 
 @dataclass(frozen=True)
