@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.estimation.division import divided
+from friction_ocp.estimation.division import cut_at, divided
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
-from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.model import Model, laid_for
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
-from friction_ocp.estimation.stages import relaxed
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.estimation.stages import is_noise, relaxed
+from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import Squares
 
 ENTRANCE = Tolerances(max_iterations=25)
@@ -34,20 +34,26 @@ def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:
 
     The next one is that whose short segments along the measured motion the parameters so far explain best: small
     motion near rest comes before large motion that only right parameters follow. It starts along its measured motion,
-    the others where they were.
+    the others where they were. It has to wait until those before it are explained as well as they can be: parameters
+    that are wrong for them would be led astray by it.
     """
-    theta, taken, left = model.space.guess, (), list(model.train)
-    nodes: tuple[FloatArray, ...] = ()
+    theta, left = model.space.guess, list(model.train)
+    taken, nodes, firsts = tuple[Experiment, ...](), tuple[FloatArray, ...](), tuple[IntArray, ...]()
     while True:
+        model = laid_for(model, dict(zip(model.space.names, theta, strict=True)))
         left.sort(key=lambda item: _mismatch(model, item, theta), reverse=True)
         taken = (*taken, left.pop())
         program = relaxed(model, taken, 0.0, Squares())
+        program = cut_at(model, program, [*firsts, program.segments[-1].first])
         watch = phases.begin(f"{len(taken)} of {len(model.train)} recordings")
         start = Point(theta, (*nodes, *program.suggested_nodes(theta)[len(nodes) :]))
         end = solve_gauss_newton(program, start, ENTRANCE, watch)
-        theta, nodes = end.point.theta, end.point.nodes
+        if not left or not is_noise(program, end):
+            end, program = _renewed(model, program, end, phases)
         if not left:
-            return _in_order(*_renewed(model, program, end, phases), model)
+            return _in_order(end, program, model)
+        theta, nodes = end.point.theta, end.point.nodes
+        firsts = tuple(cut.first for cut in program.segments)
 
 
 def _renewed(model: Model, program: Program, end: Solution, phases: Phases) -> tuple[Solution, Program]:

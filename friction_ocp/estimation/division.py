@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.estimation.gap import gap_weights
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.estimation.stages import cuts, relaxed, segments_at
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 GROWTH = 4.0
@@ -31,26 +32,46 @@ def divided(model: Model, program: Program, point: Point) -> tuple[Program, Poin
         own = track.states[first[:-1]].copy()
         own[np.searchsorted(first, cut.first[:-1])] = point.nodes[index]
         nodes.append(own)
-        start = _start_weight(cut, first.size - 1)
-        cut_again.append(replace(cut, first=first, gap_weight=gap_weights(model, item, first), start_weight=start))
+        cut_again.append(segments_at(model, item, first))
     if all(new.count == old.count for new, old in zip(cut_again, program.segments, strict=True)):
         return program, point
     return replace(program, segments=tuple(cut_again)), Point(point.theta, tuple(nodes))
 
 
-def reweighed(model: Model, program: Program) -> Program:
-    """Return relaxed segments, cut as they are, with the gaps that the torque noise of a model allows."""
+def divided_afresh(model: Model, program: Program, point: Point) -> tuple[Program, Point]:
+    """Return segments cut where differences grow along the motion at hand alone, not where they once did on the way."""
+    whole = relaxed(model, program.experiments, program.width, program.loss)
+    whole = replace(program, segments=whole.segments)
+    after, _ = divided(model, whole, whole.point_along(program, point))
+    return after, after.point_along(program, point)
+
+
+def is_divided(model: Model, program: Program) -> bool:
+    """Whether relaxed segments were cut further than they were to begin with."""
     pairs = zip(program.experiments, program.segments, strict=True)
-    again = tuple(replace(cut, gap_weight=gap_weights(model, item, cut.first)) for item, cut in pairs)
-    return replace(program, segments=again)
+    return any(not np.array_equal(cut.first, cuts(item, model.problem.estimation.segment)) for item, cut in pairs)
 
 
-def _start_weight(cut: Segments, count: int) -> FloatArray | None:
-    """Return the weights of the priors on `count` nodes: the first keeps its own, the others have none."""
-    if cut.start_weight is None:
-        return None
-    rest = np.zeros((count - 1, cut.start_weight.shape[1]))
-    return np.concatenate([cut.start_weight[:1], rest])
+def reweighed(model: Model, program: Program) -> Program:
+    """Return relaxed segments, cut as they are, with the gaps of a model."""
+    return cut_at(model, program, [cut.first for cut in program.segments])
+
+
+def are_alike(program: Program, other: Program, share: float) -> bool:
+    """Whether the gaps of two programs that are cut alike differ by less than a share of their size."""
+    for cut, before in zip(program.segments, other.segments, strict=True):
+        if cut.gap_weight is None or before.gap_weight is None or not cut.gap_weight.size:
+            continue
+        ratio = np.linalg.solve(before.gap_weight.transpose(0, 2, 1), cut.gap_weight.transpose(0, 2, 1))
+        if np.max(np.abs(ratio - np.eye(ratio.shape[-1]))) > share:
+            return False
+    return True
+
+
+def cut_at(model: Model, program: Program, firsts: Sequence[IntArray]) -> Program:
+    """Return a program of relaxed segments cut elsewhere, by recording at the first nodes of the segments."""
+    pairs = zip(program.experiments, firsts, strict=True)
+    return replace(program, segments=tuple(segments_at(model, item, first) for item, first in pairs))
 
 
 def cut_where_they_grow(first: IntArray, slopes: FloatArray) -> IntArray:

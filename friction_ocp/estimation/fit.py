@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from friction_ocp.estimation.detours import detour, hop
-from friction_ocp.estimation.division import reweighed
+from friction_ocp.estimation.division import are_alike, divided_afresh, is_divided, reweighed
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
-from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.noise_level import most_likely, starting_level, with_levels
+from friction_ocp.estimation.model import Model, laid_for
+from friction_ocp.estimation.noise_level import most_likely, with_levels
 from friction_ocp.estimation.points_fit import fit_points
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
@@ -24,7 +22,7 @@ from friction_ocp.estimation.synchronise import synchronised
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
 SETTLED = 0.01
-"""Relative change of a level of torque noise, below which it and the parameters are found."""
+"""Relative change of the size of a gap, as inertias, stiffnesses and torque noise are found, below which none moves."""
 
 
 def fit(model: Model, progress: Progress = silent) -> Fitted:
@@ -52,26 +50,34 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     model, fitted = synchronised(model, fit(model, progress), phases)
-    if model.problem.estimation.estimated_noise and model.train:
-        model, fitted = weighed(model, fitted, phases)
+    if model.train:
+        model, fitted = relaid(model, fitted, phases)
     return refined(model, fitted, phases)
 
 
-def weighed(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
-    """Estimate the torque noise along the fit, fit again with it, and so on until no level moves; return both.
+def relaid(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
+    """Lay the gaps between segments for what was found, fit again, and so on until no gap moves; return both.
 
-    Where free runs are fitted the noise is only reported: they know of none.
+    What a torque noise gathers in a gap hangs on the inertia, and the size of a bristle on its stiffness: with gaps
+    laid for the guesses the answer would hang on them. Torque noise that is asked for is estimated along the fit, too.
+    Where free runs are fitted there are no gaps, and the noise is only reported.
     """
+    asked, joined = model.problem.estimation.estimated_noise, not fits_free_run(model)
     for turn in range(MOST_TURNS):
-        before = np.array([starting_level(model, shaft) for shaft in model.problem.estimation.estimated_noise])
-        levels = most_likely(model, fitted.program, fitted.solution.point)
-        model = with_levels(model, levels)
-        after = np.array([level.value for level in levels])
-        if fits_free_run(model) or np.all(np.abs(np.log(after / before)) <= SETTLED):
+        point = fitted.solution.point
+        if joined:
+            model = laid_for(model, dict(zip(model.space.names, map(float, point.theta), strict=True)))
+        if asked:
+            model = with_levels(model, most_likely(model, fitted.program, point))
+        if not joined:
             break
-        program = reweighed(model, fitted.program)
-        watch = phases.begin(f"torque noise, turn {turn + 1}")
-        end = final_solver(model)(program, fitted.solution.point, limits(model), watch)
+        program, again = reweighed(model, fitted.program), turn == 0 and is_divided(model, fitted.program)
+        if not again and are_alike(program, fitted.program, SETTLED):
+            return model, Fitted(replace(fitted.solution, objective=program.objective(point)), program)
+        watch = phases.begin(f"gaps between segments, turn {turn + 1}")
+        if again:
+            program, point = divided_afresh(model, program, point)
+        end = final_solver(model)(program, point, limits(model), watch)
         fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
     return model, fitted
 

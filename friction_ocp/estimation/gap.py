@@ -61,7 +61,7 @@ def torque_covariance(mech: Mechanism, still: FloatArray, noise: FloatArray, spa
 
 
 def _group_noise(model: Model, item: Experiment) -> FloatArray:
-    numbers = model.space.numbers(model.space.guess, item.name)
+    numbers = model.space.numbers(model.nominal, item.name)
     return acceleration_noise(model.drive.mechanism, model.process_noise, numbers)
 
 

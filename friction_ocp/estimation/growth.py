@@ -19,7 +19,6 @@ from friction_ocp.estimation.rounds import (
     Fitted,
     Plan,
     final_solver,
-    is_noise,
     is_sound,
     limits,
     prediction,
@@ -27,6 +26,7 @@ from friction_ocp.estimation.rounds import (
     staged,
     windowed,
 )
+from friction_ocp.estimation.stages import is_noise
 
 GROWTH = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Windows of a free run over its horizon, one after another, for a drive that drifts."""

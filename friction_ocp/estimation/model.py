@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
@@ -72,6 +72,13 @@ class Model:
     static_validation: tuple[StaticTerm, ...] = ()
     noise_levels: tuple[NoiseLevel, ...] = ()
     """Torque noise that was estimated."""
+    found: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Parameters that gaps between segments and sizes of states are laid for, by name; guesses of those it lacks."""
+
+    @property
+    def nominal(self) -> FloatArray:
+        """(parameters,) what gaps between segments and sizes of states are laid for."""
+        return self.space.with_known(self.found)
 
     @property
     def process_noise(self) -> Mapping[str, float]:
@@ -99,7 +106,7 @@ def prepare(problem: Problem) -> Model:
     train = tuple(experiments[: len(problem.train)])
     floors = {channel.name: noise_floor(channel, _signals(problem, channel.name)) for channel in problem.drive.outputs}
     states = np.concatenate(
-        [np.zeros((0, len(drive.state_names))), *(_suggested(sweep, space, item) for item in train)]
+        [np.zeros((0, len(drive.state_names))), *(_suggested(sweep, space, item, space.guess) for item in train)]
     )
     static = tuple(static_term(use, problem.drive, space) for use in problem.static)
     model = Model(
@@ -190,7 +197,7 @@ def with_drive(model: Model, drive: Drive) -> Model:
         tuple(_with_step(seen_by(model, after, item), max_step, model.max_step) for item in items)
         for items in (model.train, model.validation)
     )
-    states = np.concatenate([_suggested(sweep, space, item) for item in train])
+    states = np.concatenate([_suggested(sweep, space, item, space.guess) for item in train])
     seen = replace(
         model,
         problem=problem,
@@ -216,6 +223,13 @@ def with_step(model: Model, max_step: float) -> Model:
         tuple(_with_step(item, max_step, model.max_step) for item in items) for items in (model.train, model.validation)
     )
     return replace(model, train=train, validation=validation, max_step=max_step)
+
+
+def laid_for(model: Model, found: Mapping[str, float]) -> Model:
+    """Return a model whose gaps between segments and sizes of states are those that parameters by name call for."""
+    after = replace(model, found=dict(found))
+    states = [_suggested(model.sweep, model.space, item, after.nominal) for item in model.train]
+    return replace(after, state_scale=_state_scale(np.concatenate(states))) if states else after
 
 
 def seen_by(model: Model, drive: SteppedDrive, item: Experiment, known: Sequence[str] | None = None) -> Experiment:
@@ -248,8 +262,8 @@ def _signals(problem: Problem, name: str) -> list[tuple[FloatArray, FloatArray]]
     return [(channel.time, channel.values) for channel in channels]
 
 
-def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment) -> FloatArray:
-    numbers = space.numbers(space.guess, item.name)
+def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment, theta: FloatArray) -> FloatArray:
+    numbers = space.numbers(theta, item.name)
     signals = item.signals(slice(None))
     value, _ = sweep.start.map(item.grid.time.size)(*(signal.T for signal in signals), numbers)
     return np.asarray(value).T

@@ -213,7 +213,7 @@ def starting_level(model: Model, shaft: str) -> float:
     mech = model.drive.mechanism
     group = mech.topology.group_of[shaft]
     item = model.train[0]
-    numbers = model.space.numbers(model.space.guess, item.name)
+    numbers = model.space.numbers(model.nominal, item.name)
     per_unit = acceleration_noise(mech, {shaft: 1.0}, numbers)[group]
     span = float(np.mean(np.diff(item.grid.time[cuts(item, model.problem.estimation.segment)])))
     column = len(mech.angle_groups) + list(mech.free_groups).index(group)

@@ -20,6 +20,7 @@ from friction_ocp.estimation.release import released
 from friction_ocp.estimation.stages import (
     WIDTHS,
     free_run,
+    is_noise,
     keeps_the_loss,
     loss_of_round,
     mean_error,
@@ -202,14 +203,6 @@ def _on_grid(program: Program, end: Solution) -> FloatArray:
     variance = np.diag(told) * 2.0 * end.objective / max(samples, 1)
     cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
     return space.clip(cell * np.round(theta / cell))
-
-
-def is_noise(program: Program, end: Solution) -> bool:
-    """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
-    if not isinstance(program.loss, Squares):
-        return False
-    samples = program.samples
-    return end.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))
 
 
 def is_sound(model: Model, fitted: Fitted) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import gap_weights
+from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import has_nested
@@ -66,11 +67,14 @@ def predictions(model: Model, experiments: Experiments, width: float) -> Program
 
 def relaxed(model: Model, experiments: Experiments, width: float, loss: AbstractLoss) -> Program:
     """Return segments joined by process noise."""
-    segments: list[Segments] = []
-    for item in experiments:
-        first = cuts(item, model.problem.estimation.segment)
-        segments.append(_with_start(model, Segments(first, gap_weights(model, item, first))))
-    return program_of(model, experiments, tuple(segments), width, loss)
+    pieces = [(item, cuts(item, model.problem.estimation.segment)) for item in experiments]
+    segments = tuple(segments_at(model, item, first) for item, first in pieces)
+    return program_of(model, experiments, segments, width, loss)
+
+
+def segments_at(model: Model, item: Experiment, first: IntArray) -> Segments:
+    """Return segments of a recording joined by process noise, from their first nodes and the one behind them."""
+    return _with_start(model, Segments(first, gap_weights(model, item, first)))
 
 
 def along_measurement(model: Model, width: float) -> Program:
@@ -158,3 +162,11 @@ def loss_of_round(model: Model, program: Program, best: Point, number: int) -> A
         case "absolute":
             roundings = roundings_of(model, program)
             return Absolute(roundings[min(number, len(roundings) - 1)] * mean_error(program, best))
+
+
+def is_noise(program: Program, end: Solution) -> bool:
+    """Whether a fit by squares leaves no more than noise of the stated size would, within five deviations."""
+    if not isinstance(program.loss, Squares):
+        return False
+    samples = program.samples
+    return end.objective <= 0.5 * samples * (1.0 + 5.0 * float(np.sqrt(2.0 / samples)))

@@ -62,7 +62,8 @@ def align(workshop: Workshop, content: Json) -> Json:
     """Solve again from the end of another fit, with the integrator steps and torque noise of the optimum at hand."""
     other, model = Optimum.read(content), workshop.model
     program = workshop.fitted.program
-    end = resolve(model, program, other.solution.point)
+    start = program.point_along(other.fitted(model).program, other.solution.point)
+    end = resolve(model, program, start)
     iterations = end.iterations + other.solution.iterations
     return replace(Optimum.of(model, workshop.fitted), solution=replace(end, iterations=iterations)).document()
 

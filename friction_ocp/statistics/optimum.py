@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.estimation.clocks import Moves
+from friction_ocp.estimation.division import cut_at, is_divided
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.model import Model, late_of, with_late, with_step
+from friction_ocp.estimation.horizon import fits_free_run
+from friction_ocp.estimation.model import Model, laid_for, late_of, with_late, with_step
 from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.noise_level import with_levels
 from friction_ocp.estimation.program import Point
@@ -36,21 +38,30 @@ class Optimum:
     """By how much stamps were moved."""
     late: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict[str, Mapping[str, float]])
     """By recording and channel: what reading samples earlier undoes of delays, s."""
+    found: Mapping[str, float] = dataclasses.field(default_factory=dict[str, float])
+    """Parameters that the gaps between segments are laid for, by name."""
+    firsts: tuple[tuple[int, ...], ...] = ()
+    """By recording the first nodes of its segments, where some were cut further than they were to begin with."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
         """Take the end of a fit, and what of its model was settled on the way, without its program."""
-        settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model))
-        return cls(fitted.solution, fitted.program.loss, *settled)
+        settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model), model.found)
+        joined = not fits_free_run(model) and is_divided(model, fitted.program)
+        firsts = [tuple(cut.first.tolist()) for cut in fitted.program.segments] if joined else ()
+        return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts))
 
     def settled(self, model: Model) -> Model:
         """Return the model with the integrator steps, the torque noise and the stamps that the fit ended with."""
         moved = with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
-        return with_late(moved, self.late)
+        return laid_for(with_late(moved, self.late), self.found)
 
     def fitted(self, model: Model) -> Fitted:
         """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
-        return Fitted(self.solution, program_builder(model)(model, 0.0, self.loss))
+        program = program_builder(model)(model, 0.0, self.loss)
+        if self.firsts:
+            program = cut_at(model, program, [np.array(first, dtype=np.int64) for first in self.firsts])
+        return Fitted(self.solution, program)
 
     def document(self) -> dict[str, Any]:
         """Return plain values; an objective that is not finite becomes None."""
@@ -66,6 +77,8 @@ class Optimum:
             "max_step": self.max_step,
             "moves": {name: {clock: list(fast) for clock, fast in item.items()} for name, item in self.moves.items()},
             "late": {name: dict(item) for name, item in self.late.items()},
+            "found": dict(self.found),
+            "firsts": [list(first) for first in self.firsts],
             "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
@@ -90,7 +103,9 @@ class Optimum:
             name: {channel: float(seconds) for channel, seconds in item.items()}
             for name, item in content["late"].items()
         }
-        return cls(solution, loss, float(content["max_step"]), levels, moves, late)
+        found = {name: float(value) for name, value in content["found"].items()}
+        firsts = tuple(tuple(int(node) for node in first) for first in content["firsts"])
+        return cls(solution, loss, float(content["max_step"]), levels, moves, late, found, firsts)
 
 
 def _plain(level: NoiseLevel) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from checks import Check, print_rows, tell_status
 from parameter_box import FloatArray, ParameterBox
 
 from friction_ocp.estimation.estimate import conclude
-from friction_ocp.estimation.fit import fit
+from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.estimation.stages import mean_error
@@ -100,7 +100,7 @@ def run_start(job: Job) -> End:
     start = box.repaired(box.random_start(np.random.default_rng([job.seed, job.number])))
     began = time.perf_counter()
     moved = replace(model, space=model.space.moved(start))
-    fitted = fit(moved)
+    moved, fitted = settled(moved)
     seconds = time.perf_counter() - began
     estimate = conclude(moved, fitted, 0.0, seconds)
     return End(
