@@ -40,8 +40,7 @@ def divided(model: Model, program: Program, point: Point) -> tuple[Program, Poin
 
 def divided_afresh(model: Model, program: Program, point: Point) -> tuple[Program, Point]:
     """Return segments cut where differences grow along the motion at hand alone, not where they once did on the way."""
-    whole = relaxed(model, program.experiments, program.width, program.loss)
-    whole = replace(program, segments=whole.segments)
+    whole = replace(program, segments=relaxed(model, program.experiments, 0.0, program.loss).segments)
     after, _ = divided(model, whole, whole.point_along(program, point))
     return after, after.point_along(program, point)
 

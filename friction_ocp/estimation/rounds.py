@@ -40,6 +40,8 @@ RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
 FINALISTS = 5
 """Starts that are followed to the end."""
+SAME = 0.01
+"""Relative difference of parameters up to which ends of equal objective are one."""
 GRID = 0.03
 """Distance of the starts of rounds with kinks over the standard deviation."""
 
@@ -99,25 +101,32 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     Return the ends, best first. The full model then starts from several releases of what the simpler one leaves out.
     """
     conclusive = plan.conclusive and model.problem.estimation.loss == "squares"
+    ends: list[Fitted] = []
     if conclusive and plan.builder is joined and model.static and may_enter_in_turn(model):
-        in_turn = Fitted(*introduced(model, phases))
-        if is_sound(model, in_turn):
-            return [in_turn]
+        ends.append(Fitted(*introduced(model, phases)))
+        if is_sound(model, ends[0]):
+            return ends
     if conclusive:
-        at_once = _rounds(model, replace(plan, widths=plan.widths[-1:]), [model.space.guess], "direct fit", phases)
-        if is_sound(model, at_once[0]):
-            return at_once
+        ends += _rounds(model, replace(plan, widths=plan.widths[-1:]), [model.space.guess], "direct fit", phases)
+        if is_sound(model, ends[-1]):
+            return ends
     simple = nested_space(model.problem, model.space)
     if simple is model.space:
-        return _rounds(model, plan, _plain_starts(model, plan, phases), "fit", phases)
+        return _best_first([*ends, *_rounds(model, plan, _plain_starts(model, plan, phases), "fit", phases)])
     exact = replace(plan, widths=RELEASED_WIDTHS)
     if conclusive:
-        direct = _rounds(model, exact, [_predicted(model, phases)], "direct fit", phases)
-        if is_sound(model, direct[0]):
-            return direct
+        ends += _rounds(model, exact, [_predicted(model, phases)], "direct fit", phases)
+        if is_sound(model, ends[-1]):
+            return ends[-1:]
     inner = replace(model, space=simple)
     nested = _rounds(inner, plan, _plain_starts(inner, plan, phases), "simpler friction", phases)
-    return _rounds(model, exact, released(model, simple, nested[0].solution.point.theta), "fit", phases)
+    starts = released(model, simple, nested[0].solution.point.theta)
+    return _best_first([*ends, *_rounds(model, exact, starts, "fit", phases)])
+
+
+def _best_first(ends: Sequence[Fitted]) -> list[Fitted]:
+    """Return the ends of one program in the order of their objectives."""
+    return sorted(ends, key=lambda fitted: fitted.solution.objective)
 
 
 def _plain_starts(model: Model, plan: Plan, phases: Phases) -> list[FloatArray]:
@@ -157,9 +166,21 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
         ends = race(program, points, limits(model) if last else COARSE, watch, solve, enough)
         if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
+        if not last:
+            ends = _distinct(ends)
         points = [end.point for end in ends[: max(FINALISTS, (len(ends) + 1) // 2)]]
         iterations += sum(end.iterations for end in ends)
     return [Fitted(replace(end, iterations=iterations), program) for end in ends]
+
+
+def _distinct(ends: Sequence[Solution]) -> list[Solution]:
+    """Return the ends, best first, without those that are a better one as far as a coarse solution tells."""
+    kept: list[Solution] = []
+    for end in ends:
+        near = [other for other in kept if end.objective - other.objective <= COARSE.decrease * other.objective]
+        if not any(np.allclose(end.point.theta, other.point.theta, rtol=SAME, atol=0.0) for other in near):
+            kept.append(end)
+    return kept
 
 
 def _never(end: Solution) -> bool:
