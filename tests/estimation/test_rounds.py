@@ -40,10 +40,13 @@ def test_the_direct_way_counts_where_it_ends_best(model: Model, monkeypatch: pyt
         seen.append(ends[0].objective)
         return ends
 
+    def chosen(_: Model) -> rounds.Solve:
+        return direct_is_best
+
     seen: list[float] = []
     race = rounds.race
     monkeypatch.setattr(rounds, "race", noted)
-    monkeypatch.setattr(rounds, "final_solver", lambda _: direct_is_best)
+    monkeypatch.setattr(rounds, "final_solver", chosen)
     ends = staged(model, Plan(joined, WIDTHS[1:], True), Phases(silent, 1))
     objectives = [fitted.solution.objective for fitted in ends]
     assert len(seen) == 1 + len(WIDTHS[1:])
