@@ -16,8 +16,8 @@ from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Motor
 from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import FloatArray

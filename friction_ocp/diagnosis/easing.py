@@ -16,8 +16,8 @@ from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.estimation.division import cut_where_they_grow
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.simulation.grid import FloatArray
 
 EASY = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=25)

@@ -20,8 +20,8 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, in_time, with_drive
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.splicing import carried_on, spliced
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
 from friction_ocp.simulation.grid import FloatArray

@@ -10,9 +10,9 @@ import numpy as np
 from friction_ocp.diagnosis.fitting import STEPS_OF_NODES, UNIMPORTANT, FittedModel, around_kinks
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 FOLD = Tolerances(decrease=1e-5, negligible=0.1, progress=1e-3, max_iterations=8)

@@ -9,8 +9,8 @@ import numpy as np
 
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 STEPS = 6

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Linearisation, Point, Program
 from friction_ocp.estimation.quadratic import bounded_step, linear_constraints
@@ -18,6 +19,8 @@ TRUSTED = 1e-2
 """Damping up to which a small predicted decrease is taken for the end rather than for a short step."""
 UNDAMPED = 1e-9
 """Damping of the step whose predicted decrease decides about the end: it sees directions that damping hides."""
+VALLEY = (UNDAMPED, 1e-4, 1e-2)
+"""The same for steps behind which the nodes are solved for on their own."""
 FLAT = 1e-6
 """Curvature of a parameter over the largest on the way below which an end has left where the data see it."""
 LOST, BLIND = 1e-8, 1e3
@@ -60,6 +63,8 @@ class Tolerances:
     max_iterations: int = 100
     first_damping: float = FIRST_DAMPING
     """Of the first step: small at the end of another fit, where kinks stop small steps and not large ones."""
+    inner: int = 0
+    """Steps of the nodes alone behind a step without damping that gains nothing by itself; 0 does without."""
 
 
 USUAL = Tolerances()
@@ -151,17 +156,25 @@ def _undamped(program: Program, now: _Iterate, tolerances: Tolerances) -> _Itera
     Parameters that are well seen one by one and hardly seen together, such as a torque constant and all that it is
     traded for, have a long way to go along which damping, which looks at each, lets them creep. Nodes that rest at
     kinks have steps of their own that lead nowhere: in a second trial nodes do no more than follow the parameters.
+    Along a curved valley of parameters and nodes every straight step loses: in further trials, if they are asked for,
+    the nodes come back to it on their own.
     """
     space, system = program.space, now.system
     enough = max(tolerances.progress * system.objective, tolerances.negligible)
-    for follow in (False, True):
-        trial, predicted = trial_step(space, now.point, system, UNDAMPED, now.trust.scale, follow)
-        if predicted <= enough or not system.objective - program.objective(trial) > enough:
+    trials = [(UNDAMPED, False, 0), (UNDAMPED, True, 0)]
+    if tolerances.inner and not program.without_nodes:
+        trials += [(damping, False, tolerances.inner) for damping in VALLEY]
+    for damping, follow, inner in trials:
+        trial, predicted = trial_step(space, now.point, system, damping, now.trust.scale, follow)
+        if predicted <= enough:
+            continue
+        trial = solve_nodes(program, trial, inner) if inner else trial
+        if not system.objective - program.objective(trial) > enough:
             continue
         after = program.linearise(trial)
         if not np.any(_faded(after, now.trust.scale, LOST)):
             gained = system.objective - after.objective
-            return _Iterate(trial, after, Trust(UNDAMPED, now.trust.scale).after(gained / predicted, after))
+            return _Iterate(trial, after, Trust(damping, now.trust.scale).after(gained / predicted, after))
     return None
 
 

@@ -33,7 +33,7 @@ from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
-FINE = Tolerances()
+FINE = Tolerances(inner=4)
 THOROUGH = Tolerances(decrease=1e-13, negligible=1e-11, progress=1e-13)
 """For ends that have to agree wherever they started."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)

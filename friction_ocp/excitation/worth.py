@@ -12,10 +12,10 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray

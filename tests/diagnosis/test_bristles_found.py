@@ -17,8 +17,8 @@ from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.worth import samples
 from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution

@@ -19,9 +19,9 @@ from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.score import solve_nodes
 from friction_ocp.excitation.design import Design, design
 from friction_ocp.excitation.worth import evidence
 from friction_ocp.problem_file.load import load_problem
