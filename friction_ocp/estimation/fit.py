@@ -46,13 +46,17 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
 
-    Return the model with these stamps, levels and steps.
+    Return the model with these stamps, levels and steps. Shorter steps move the kinks of exact friction, and what was
+    the best end between them need not be it any more.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     model, fitted = synchronised(model, fit(model, progress), phases)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
-    return refined(model, fitted, phases)
+    finer, fitted = refined(model, fitted, phases)
+    if finer is not model and fits_free_run(model):
+        fitted = detour(finer, fitted, phases)
+    return finer, fitted
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
