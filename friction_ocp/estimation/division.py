@@ -57,8 +57,10 @@ def reweighed(model: Model, program: Program) -> Program:
 
 
 def are_alike(program: Program, other: Program, share: float) -> bool:
-    """Whether the gaps of two programs that are cut alike differ by less than a share of their size."""
+    """Whether two programs are cut alike and their gaps differ by less than a share of their size."""
     for cut, before in zip(program.segments, other.segments, strict=True):
+        if not np.array_equal(cut.first, before.first):
+            return False
         if cut.gap_weight is None or before.gap_weight is None or not cut.gap_weight.size:
             continue
         ratio = np.linalg.solve(before.gap_weight.transpose(0, 2, 1), cut.gap_weight.transpose(0, 2, 1))

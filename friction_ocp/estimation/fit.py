@@ -21,6 +21,8 @@ from friction_ocp.estimation.synchronise import synchronised
 
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
+CUTS = 2
+"""Turns in which segments are cut where differences grow along what was found; later ones keep them."""
 SETTLED = 0.01
 """Relative change of the size of a gap, as inertias, stiffnesses and torque noise are found, below which none moves."""
 
@@ -75,12 +77,12 @@ def relaid(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]
             model = with_levels(model, most_likely(model, fitted.program, point))
         if not joined:
             break
-        program, again = reweighed(model, fitted.program), turn == 0 and is_divided(model, fitted.program)
-        if not again and are_alike(program, fitted.program, SETTLED):
+        program = reweighed(model, fitted.program)
+        if is_divided(model, program) and turn < CUTS:
+            program, point = divided_afresh(model, program, point)
+        if are_alike(program, fitted.program, SETTLED):
             return model, Fitted(replace(fitted.solution, objective=program.objective(point)), program)
         watch = phases.begin(f"gaps between segments, turn {turn + 1}")
-        if again:
-            program, point = divided_afresh(model, program, point)
         end = final_solver(model)(program, point, limits(model), watch)
         fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
     return model, fitted

@@ -34,6 +34,8 @@ from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances(inner=4)
+LEAST = 1e-3
+"""Decrease of the objective by three steps that is next to nothing, were the residuals noise."""
 THOROUGH = Tolerances(decrease=1e-13, negligible=1e-11, progress=1e-13)
 """For ends that have to agree wherever they started."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
@@ -92,7 +94,14 @@ def final_solver(model: Model) -> Solve:
 
 
 def limits(model: Model) -> Tolerances:
-    return replace(FINE, max_iterations=model.problem.estimation.max_iterations)
+    """Return when the last fit of a model stops.
+
+    A fit that ends at the noise has an objective of half a unit a sample, and a standard error is half a unit of it:
+    over many samples a small share of the objective still is a long way.
+    """
+    samples = max(sum(int(np.isfinite(item.measured).sum()) for item in model.train), 1)
+    progress = min(FINE.progress, LEAST / (0.5 * samples))
+    return replace(FINE, progress=progress, max_iterations=model.problem.estimation.max_iterations)
 
 
 def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
