@@ -1,10 +1,11 @@
 """Make problems/README.md: every problem with its question, its picture and its answer.
 
-python problems/gallery.py [--only TEXT]
+python problems/gallery.py [--only TEXT] [--out FOLDER]
 
 Each problem file is identified, or simulated where every number is known, and its section written as soon as it is
 done; `--only` renews the problems whose path contains the text and keeps the other sections. Pictures go to
 problems/gallery. A problem whose recordings are not there (problems/emps needs a download) keeps its question alone.
+`--out` writes page and pictures into another folder.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ def question_of(path: Path) -> str:
     return question[:1].upper() + question[1:]
 
 
-def section(path: Path) -> str:
-    """Return the section of a problem; draws its picture."""
+def section(path: Path, out: Path = HERE) -> str:
+    """Return the section of a problem; draws its picture below the folder of the page."""
     place = path.relative_to(HERE)
     head = f"## {place.parent.name}/{place.stem}\n\n[{place}]({place}): {question_of(path)}\n"
     try:
@@ -72,10 +73,10 @@ def section(path: Path) -> str:
         return f"{head}\nIts recordings have to be downloaded first (problems/{place.parent}).\n"
     known = not identify_needed(path)
     answered = simulate(problem) if known else identify(problem)
-    picture = PICTURES / f"{place.parent.name}-{place.stem}.png"
+    picture = out / PICTURES.name / f"{place.parent.name}-{place.stem}.png"
     draw(answered if isinstance(answered, Simulation) else answered.simulation, answered, picture)
     told = simulation_words(answered) if isinstance(answered, Simulation) else estimate_words(answered)
-    return f"{head}\n![{problem.title}]({picture.relative_to(HERE)})\n\n{told}\n"
+    return f"{head}\n![{problem.title}]({picture.relative_to(out)})\n\n{told}\n"
 
 
 def identify_needed(path: Path) -> bool:
@@ -135,7 +136,7 @@ def draw(simulation: Simulation, answered: Estimate | Simulation, path: Path) ->
             panel.fill_between(curve.speed, curve.lower, curve.upper, alpha=0.2)
         panel.set(xlabel="speed, rad/s or m/s", ylabel="friction, N m or N", title="steady friction")
         panel.legend()
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     figure.tight_layout()
     figure.savefig(path, dpi=80)
     plt.close(figure)
@@ -201,16 +202,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Renew the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", metavar="TEXT", help="only problems whose path contains this")
+    parser.add_argument("--out", type=Path, default=HERE, metavar="FOLDER", help="where the page is, or is to be")
     asked = parser.parse_args(arguments)
-    kept = sections_of(PAGE.read_text(encoding="utf-8")) if PAGE.is_file() else {}
+    page_file = asked.out / PAGE.name
+    kept = sections_of(page_file.read_text(encoding="utf-8")) if page_file.is_file() else {}
     paths = problem_files()
     for path in paths:
         if asked.only in str(path.relative_to(HERE)):
-            kept[f"{path.parent.name}/{path.stem}"] = section(path)
+            kept[f"{path.parent.name}/{path.stem}"] = section(path, asked.out)
             print(path.relative_to(HERE), flush=True)
         titles = [f"{one.parent.name}/{one.stem}" for one in paths]
         page = "\n".join([OPENING, *(kept[title] for title in titles if title in kept)])
-        PAGE.write_text(page, encoding="utf-8")
+        page_file.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":
