@@ -14,12 +14,14 @@ from leighton import (
     SLEW,
     STIFFNESS,
     TORQUE_CONSTANT,
+    fast_linear,
     fast_polyline,
     lumped,
     slow_friction,
+    slow_polyline,
     stop,
 )
-from plant import Plant, PlantMotor, PlantShaft, PlantTransmission, Trajectory
+from plant import Plant, PlantFriction, PlantMotor, PlantShaft, PlantTransmission, Trajectory
 from twin import Bench, Run, Twin, drive_of, worst
 
 from friction_ocp.drive.parts import Drive
@@ -27,6 +29,10 @@ from friction_ocp.drive.parts import Drive
 ROUNDING = 1e-9
 STOPS = 4e-3
 """Relative error of steps of 1 ms where the load comes to rest within one, on a joint of 39 rad/s."""
+
+ACCELEROMETER_NOISE = 4e-3
+"""rad/s^2."""
+TURNING = {"load.omega": SLEW / RATIO}
 
 
 def two_chains(backlash: float = 0.0) -> Plant:
@@ -106,6 +112,52 @@ def test_the_stepped_drive_follows_the_plant_through_a_stop() -> None:
     frequency = 0.5 / (1e-3 * np.mean(np.diff(crossings)))
     assert frequency == pytest.approx(np.sqrt(2.0 * STIFFNESS / LOAD_INERTIA) / (2.0 * np.pi), rel=0.02)
     assert frequency == pytest.approx(6.24, abs=0.1)
+
+
+def ringing(plant: Plant, profile: Trajectory, begin: float, end: float, initial: dict[str, float]) -> float:
+    """Return for how long after `begin` the load's acceleration leaves 4e-3 rad/s^2, the accelerometer's noise, s."""
+    run = run_of(plant, {"motor.omega": profile}, end, initial)
+    acceleration = np.gradient(run["load.omega"], 1e-3)
+    heard = run.time[(run.time > begin) & (np.abs(acceleration) > ACCELEROMETER_NOISE)]
+    return float(heard[-1] - begin)
+
+
+def stopped(fast: PlantFriction, slow: PlantFriction) -> float:
+    """Return for how long the load rings after a stop from full speed, s."""
+    return ringing(replace(lumped(fast, slow), motors=()), stop(0.5, 6.0), 0.5, 6.0, TURNING)
+
+
+def test_with_the_break_in_the_fast_part_the_load_rings_for_two_seconds() -> None:
+    """Table 2: at c0h = 0.11, R c1l = 0.0003 for about the 2 s that were measured; longer the less friction is slow."""
+
+    def cell(c0h: float, slow_viscous: float) -> float:
+        fast = fast_polyline(c0h, 0.0042 - slow_viscous, 0.0004 - slow_viscous)
+        return stopped(fast, slow_friction(0.1447 - c0h, slow_viscous))
+
+    assert cell(0.11, 0.0003) == pytest.approx(2.0, abs=0.4)
+    row = [cell(0.11, slow_viscous) for slow_viscous in (0.0, 0.0001, 0.0002, 0.0003, 0.0004)]
+    column = [cell(c0h, 0.0003) for c0h in (0.05, 0.08, 0.11, 0.14)]
+    assert row == sorted(row, reverse=True) and column == sorted(column)
+    assert max(*row, *column) > 2.5 and min(*row, *column) < 1.5
+
+
+@pytest.mark.parametrize("c1h", [0.0, 0.0002, 0.0004])
+@pytest.mark.parametrize("c0h", [0.05, 0.11, 0.14])
+def test_with_the_break_in_the_slow_part_it_is_silent_within_one(c0h: float, c1h: float) -> None:
+    """Table 3: all simulations with the break in the slow part are much shorter than 2 s, or even 1 s."""
+    slow = slow_polyline(0.1447 - c0h, 0.0042 - c1h, 0.0004 - c1h)
+    assert stopped(fast_linear(c0h, c1h), slow) < 1.0
+
+
+def test_a_start_rings_as_a_stop_does() -> None:
+    """Figs. 11, 12: the load on its spring sees the whole speed at once: (omega / n) sqrt(2 K / J) either way."""
+    plant = replace(lumped(fast_polyline(), slow_friction()), motors=())
+    start = Trajectory(np.array([0.0, 0.5, 0.51, 3.0]), np.array([0.0, 0.0, SLEW, SLEW]), "linear")
+    undamped = SLEW / RATIO * np.sqrt(2.0 * STIFFNESS / LOAD_INERTIA)
+    for profile, initial, sign in ((start, {}, 1.0), (stop(0.5, 3.0), TURNING, -1.0)):
+        acceleration = sign * np.gradient(run_of(plant, {"motor.omega": profile}, 3.0, initial)["load.omega"], 1e-3)
+        assert 0.9 * undamped < np.max(acceleration) < undamped
+        assert np.argmax(acceleration) < np.argmin(acceleration)
 
 
 def test_the_spring_of_the_fast_side_is_a_fast_mode_without_visible_effect() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import leighton
 import numpy as np
 import pytest
 from plant import Plant, PlantFriction, PlantMotor, PlantShaft, PlantTransmission
@@ -67,6 +68,19 @@ def effort(drive: Drive, kind: Effort, speed: float, angle: float = 0.0, placed:
     steady = steady_drive(drive, kind, placed)
     values = {leaf.path: float(leaf.value) for leaf in drive_leaves(drive)}
     return float(steady.effort(speed, angle, np.array([values[path] for path in steady.parameter_names])))
+
+
+@pytest.mark.parametrize("speed", [50.0, 104.25, 266.0])
+def test_both_parts_of_the_leighton_telescope_add_up_at_its_motor(speed: float) -> None:
+    """T_load = T_rh + R T_rl (eq. 7): both parts of eq. 13 together are the polyline of eqs. 5, 6, break at 0.5826 N m.
+
+    Beyond the break c2h + R c1l = 0.0004, which eq. 6 has as 0.000417.
+    """
+    plant = leighton.lumped(leighton.fast_polyline(), leighton.slow_friction())
+    found = effort(drive_of(plant, {"motor.current": 0.0}), "torque", speed)
+    assert found == pytest.approx(0.1447 + 0.0042 * min(speed, 104.25) + 0.0004 * max(speed - 104.25, 0.0), rel=1e-9)
+    if speed == leighton.BREAK:
+        assert found == pytest.approx(0.5826, abs=1e-4)
 
 
 def test_friction_that_loads_itself_is_solved_for() -> None:

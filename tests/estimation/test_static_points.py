@@ -121,6 +121,34 @@ def stop_of_the_load() -> Recording:
     return Recording("stop", channels)
 
 
+def test_three_segments_are_found() -> None:
+    """A curve of three segments, as in Fig. 3a of the Leighton telescope paper: every slope and both breaks."""
+    friction = PlantFriction("polyline", tau_c=0.2, slopes=(0.02, 0.004, 0.01), breaks=(5.0, 15.0))
+    plant, speeds = Plant((PlantShaft("motor", 0.001, friction),), ()), np.linspace(0.5, 30.0, 60)
+    torque = [
+        plant.simulate(0.01, {"motor.omega": float(speed)}, step=1e-4, truth_rate=1000).truth["motor.friction"][-1]
+        for speed in speeds
+    ]
+    noise = SCATTER * np.random.default_rng(21).standard_normal(speeds.size)
+    points = StaticPoints(
+        "curve",
+        speeds,
+        {"speed": "rad/s", "torque": "N m", "std_error": "N m"},
+        torque=np.array(torque) + noise,
+        std_error=np.full(speeds.size, SCATTER),
+    )
+    law = Polyline(
+        Free(0.1, 0.0, 1.0),
+        tuple(Free(0.01, -0.1, 0.1) for _ in range(3)),
+        (Free(3.0, 1.0, 12.0), Free(20.0, 12.0, 28.0)),
+    )
+    estimate = identify(problem_of(Drive((Shaft("motor", 0.001, FrictionElement(law)),)), points))
+    assert estimate.converged
+    for item, wanted in zip(estimate.parameters, (0.2, 0.02, 0.004, 0.01, 5.0, 15.0), strict=True):
+        assert item.verdict.word == "ok", item.name
+        assert abs(item.value - wanted) < 4.0 * item.std_error < 0.4 * wanted, item.name
+
+
 def test_points_alone_that_leave_a_doubt_are_checked(points: StaticPoints) -> None:
     """Dry friction on both sides of a gear is one sum at constant speed: a warning, and no further channel to name."""
     drive = drive_with(
