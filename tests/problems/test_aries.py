@@ -12,7 +12,7 @@ from friction_ocp.recording.hdf5 import read_recording, read_static_points
 
 ARIES = REPOSITORY / "problems" / "aries"
 RECORDED = REPOSITORY / "data" / "aries"
-DATA = script("aries", "make_data")
+DATA, TWO_STEP, CYCLES = (script("aries", name) for name in ("make_data", "two_step", "cycles"))
 INTERVALS = 4.0
 SIDES = {"east_west": 0, "west_east": 1}
 
@@ -27,11 +27,12 @@ def test_every_problem_file_is_sound_and_opens_with_its_question(path) -> None:
 
 @pytest.mark.parametrize("direction", SIDES)
 def test_the_stribeck_curve_beyond_its_limit_cycles_is_that_of_table_1(direction: str) -> None:
-    """Speeds that run evenly lie on eq. 8: Coulomb and viscous part follow from them alone."""
+    """Speeds that run evenly lie on eq. 8, and give its numbers by eq. 9: delta is found, not given."""
     estimate = identify(load_problem(ARIES / f"curve_{direction}.yaml"))
     side = SIDES[direction]
-    assert estimate.values["axis.friction.tau_c"] == pytest.approx(aries.NUMBERS["tau_c"][side], rel=0.03)
-    assert estimate.values["axis.friction.viscous"] == pytest.approx(aries.NUMBERS["viscous"][side], rel=0.03)
+    for name in ("tau_c", "tau_s", "omega_s", "viscous"):
+        assert estimate.values[f"axis.friction.{name}"] == pytest.approx(aries.NUMBERS[name][side], rel=0.03), name
+    assert estimate.values["axis.friction.delta"] == pytest.approx(aries.DELTA, abs=0.05)
 
 
 @pytest.mark.parametrize("direction", SIDES)
@@ -47,6 +48,8 @@ def test_averages_of_limit_cycles_are_biased(direction: str) -> None:
     assert 5 <= cycling.sum() <= 25
     assert np.median((torque / steady - 1.0)[cycling]) < -0.02
     assert np.max(np.abs(torque / steady - 1.0)[~cycling]) < 0.02
+    averaged = identify(load_problem(ARIES / f"curve_all_{direction}.yaml"))
+    assert abs(averaged.values["axis.friction.delta"] - aries.DELTA) > 0.1
 
 
 def run_of(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -94,6 +97,38 @@ def test_the_bristle_is_found_from_small_steps(direction: str) -> None:
     assert estimate.converged
     assert estimate.values["axis.friction.sigma0"] == pytest.approx(aries.NUMBERS["sigma0"][side], rel=0.03)
     assert estimate.values["axis.friction.sigma1"] == pytest.approx(aries.NUMBERS["sigma1"][side], rel=0.1)
+
+
+@pytest.mark.parametrize("direction", SIDES)
+def test_the_second_order_reading_of_small_steps_gives_table_2(direction: str) -> None:
+    """Eqs. 12 to 15 on steps of 50 N m, inertia and sigma2 known: a reasonable estimate, as the paper calls it.
+
+    Even then the bristle creeps: the stiffness is found to 5 %, the damping to 30 %.
+    """
+    side = SIDES[direction]
+    small = read_recording(RECORDED / f"small_steps_{direction}.h5")
+    found = TWO_STEP.second_order(small, aries.INERTIA, aries.NUMBERS["viscous"][side])
+    assert found["sigma0"] == pytest.approx(aries.NUMBERS["sigma0"][side], rel=0.05)
+    assert found["sigma1"] == pytest.approx(aries.NUMBERS["sigma1"][side], rel=0.3)
+
+
+@pytest.mark.slow
+def test_the_model_repeats_the_presliding_loop() -> None:
+    """Fig. 7: both stiffnesses of Table 2 are found from the loop, and its area is repeated within 5 %."""
+    problem = load_problem(ARIES / "hysteresis.yaml")
+    estimate = identify(problem)
+    assert estimate.converged
+    for side, direction in enumerate(("positive", "negative")):
+        found = estimate.values[f"axis.friction.sigma0.{direction}"]
+        assert found == pytest.approx(aries.NUMBERS["sigma0"][side], rel=0.03)
+    run, torque = estimate.simulation.train[0], problem.train[0].recording.channels["torque"]
+    logged = np.isfinite(run.measured[:, 0])
+    time = run.time[logged]
+    measured, simulated = (
+        CYCLES.loop_area(time, values[logged, 0], np.interp(time, torque.time, torque.values))
+        for values in (run.measured, run.simulated)
+    )
+    assert simulated == pytest.approx(measured, rel=0.05)
 
 
 @pytest.mark.slow
@@ -149,3 +184,14 @@ def test_breakaway_falls_with_the_rate_of_the_ramp() -> None:
     start = position.time[np.argmax(position.values > 1e-4)]
     breakaway = float(np.interp(start, torque.time, torque.values))
     assert 1298.0 < breakaway < 1541.7
+
+
+@pytest.mark.slow
+def test_the_model_breaks_away_where_the_axis_does() -> None:
+    """Fig. 4: under a ramp of 100 N m/s at the same torque to 0.5 %, by up to a tenth below T_S of Table 1."""
+    runs = simulate(load_problem(ARIES / "breakaway.yaml")).train
+    for side, run in enumerate(runs):
+        moved = [np.argmax(np.abs(position[:, 0]) > DATA.MOVED) for position in (run.measured, run.simulated)]
+        measured, simulated = 100.0 * run.time[moved]
+        assert simulated == pytest.approx(measured, rel=5e-3)
+        assert 0.9 * aries.NUMBERS["tau_s"][side] < measured < aries.NUMBERS["tau_s"][side]

@@ -9,7 +9,10 @@ import pytest
 from lto_cases import REPOSITORY, script
 
 from friction_ocp import Estimate, check, identify, load_problem
+from friction_ocp.estimation.agreement import curve_distance
+from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import RecordingUse, StaticUse
+from friction_ocp.estimation.score import simulate_recordings
 from friction_ocp.result_document import estimate_document
 
 LTO = REPOSITORY / "problems" / "lto"
@@ -70,6 +73,15 @@ def test_curve_and_responses_together_tell_how_friction_is_distributed() -> None
     )
     assert training.noise_ratio < 1.1 and held_out.noise_ratio < 1.1
     assert_coherent(estimate, "stop_again")
+    assert_predicts_the_currents(estimate)
+
+
+def assert_predicts_the_currents(estimate: Estimate) -> None:
+    """Assert that measured and predicted current are as close as their errors let them, as Figs. 15 and 22 show."""
+    for fit in estimate.simulation.static:
+        assert (fit.effort, fit.unit) == ("current", "A")
+        assert np.max(np.abs(fit.predicted / fit.measured - 1.0)) < 0.01
+        assert fit.noise_ratio < 1.6
 
 
 def assert_coherent(estimate: Estimate, recording: str) -> None:
@@ -101,12 +113,81 @@ def test_the_ranges_of_equation_10_do_not_move_an_estimate_inside_them() -> None
         assert held.values[name] == pytest.approx(value, rel=1e-3)
 
 
+def test_the_ranges_of_equation_11_do_not_move_an_estimate_inside_them() -> None:
+    """With the break in the slow part: slopes of the slow part of either sign, c0h and R c0l within c0."""
+    estimate = fitted("low_speed_ranges")
+    assert_close(
+        estimate,
+        DATA.low_speed_polyline().truth,
+        {"motor.friction.tau_c": 0.1, "load.friction.tau_c": 0.1, "motor.friction.viscous": 0.1},
+    )
+    for name, value in fitted("low_speed_truth").values.items():
+        assert estimate.values[name] == pytest.approx(value, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_slope_of_the_fast_part_may_be_negative() -> None:
+    """Eq. 10 with R c1l above c1, so that c1h < 0: friction of the fast part that falls up to the break is found.
+
+    As c2h is not negative, this takes a total that grows more steeply beyond the break.
+    """
+    telescope = DATA.Telescope(
+        "falling",
+        DATA.leighton.fast_polyline(0.11, -0.0005, 0.0004),
+        DATA.leighton.slow_friction(0.0347, 0.0012, chains=2),
+        DATA.high_speed_polyline().truth
+        | {
+            "motor.friction.slopes.0": -0.0005,
+            "motor.friction.slopes.1": 0.0004,
+            "load.friction.viscous": DATA.leighton.RATIO**2 * 0.0012,
+        },
+    )
+    uses = tuple(
+        RecordingUse(DATA.response(telescope, kind, 700 + k, kind)) for k, kind in enumerate(("start", "stop"))
+    )
+    points = (StaticUse(DATA.curve(telescope, 702)),)
+    base = load_problem(LTO / "ranges.yaml")
+    estimate = identify(replace(base, train=uses, static=points, validation=(), static_validation=()))
+    assert estimate.converged, estimate.message
+    assert_close(estimate, telescope.truth, {"load.friction.tau_c": 0.1, "motor.friction.tau_c": 0.1})
+
+
 @pytest.mark.slow
 def test_the_parabola_is_refined_by_curve_and_stop_together() -> None:
     """Eq. 16: 0.13, 0.0042, -1.147e-5 in the fast part, 0.00537 and 0.000786 in the slow one."""
     estimate = fitted("quadratic")
     assert_close(estimate, DATA.quadratic().truth, {"load.friction.tau_c": 0.1})
     assert_coherent(estimate, "stop")
+    assert_predicts_the_currents(estimate)
+
+
+@pytest.mark.slow
+def test_the_refined_parabola_is_nearer_by_the_distance_d() -> None:
+    """Eqs. 14 to 16: on the stop of eq. 16 the identified numbers have the d of the plant, those of eq. 14 a larger.
+
+    The errors that the likelihood counts tell them apart far better: d takes what is late for what is near.
+    """
+    problem = load_problem(LTO / "quadratic.yaml")
+    stop = tuple(use for use in problem.train if use.name == "stop")
+    model = prepare(replace(problem, train=stop, static=(), validation=(), static_validation=()))
+    gain = {"acceleration.gain": DATA.ACCELEROMETER_GAIN}
+    refined = DATA.quadratic().truth | gain
+    first = refined | {
+        "motor.friction.tau_c": 0.1007,
+        "motor.friction.viscous": 0.0047,
+        "load.friction.tau_c": DATA.leighton.RATIO * 0.0347,
+        "load.friction.viscous": DATA.leighton.RATIO**2 * 0.0003,
+    }
+    distances, errors = list[float](), list[float]()
+    for values in (identify(problem).values, refined, first):
+        (run,) = simulate_recordings(model, model.train, np.array([values[name] for name in model.space.names]))
+        own = (run.time > DATA.STOP_AT - 0.05) & (run.time < DATA.STOP_AT + 3.0)
+        measured, simulated = run.measured[own, 0], run.simulated[own, 0]
+        distances.append(curve_distance(run.time[own], measured, simulated))
+        errors.append(float(np.sqrt(np.mean((measured - simulated) ** 2))))
+    assert distances[0] == pytest.approx(distances[1], rel=0.02)
+    assert distances[2] > 1.5 * distances[1]
+    assert errors[2] > 10.0 * errors[1]
 
 
 @pytest.mark.slow
