@@ -16,6 +16,8 @@ import numpy as np
 import random_starts
 import telescope_draws
 from checks import Check
+from papers import papers
+from problem_files import gallery_line
 from servo import all_of
 
 from friction_ocp.estimation.estimate import identify
@@ -179,5 +181,11 @@ def starts(line: str, quick: bool) -> Check:
     return all_of(line, checks)
 
 
-MEASURES: Mapping[str, Callable[[str, bool], Check]] = {"lto": lto, "aries": aries, "random_starts": starts}
+MEASURES: Mapping[str, Callable[[str, bool], Check]] = {
+    "papers": papers,
+    "lto": lto,
+    "aries": aries,
+    "random_starts": starts,
+    "gallery": gallery_line,
+}
 """By ID in done_when.yaml."""
