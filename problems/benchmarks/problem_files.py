@@ -20,7 +20,13 @@ sys.path.append(str(PROBLEMS))
 
 import gallery
 
-TESTS = ("tests/problems", "tests/benchmarks/test_emps.py")
+TESTS = (
+    "tests/problems/test_lto.py",
+    "tests/problems/test_aries.py",
+    "tests/problems/test_two_mass.py",
+    "tests/problems/test_xl330.py",
+    "tests/benchmarks/test_emps.py",
+)
 """Where the problem files are run."""
 ROW = re.compile(r"^\| `(.+?)` \| (\S+) \| (\S+) \| (.+?) \| (\S+) \|$", re.MULTILINE)
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")

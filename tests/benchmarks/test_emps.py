@@ -102,7 +102,7 @@ def driven(name: str, values: dict[str, float], swing: float) -> Recording:
     return Recording(name, channels | {"reference": Channel("reference", grid, wanted.at(grid), "m")})
 
 
-STALLS = pytest.mark.xfail(strict=True, reason="the fit stalls before the optimum, with twice the error of the truth")
+STALLS = pytest.mark.xfail(strict=True, reason="stalls from the guesses of the file, ten times as far off as the truth")
 
 
 @pytest.mark.slow
