@@ -102,11 +102,8 @@ def driven(name: str, values: dict[str, float], swing: float) -> Recording:
     return Recording(name, channels | {"reference": Channel("reference", grid, wanted.at(grid), "m")})
 
 
-STALLS = pytest.mark.xfail(strict=True, reason="stalls from the guesses of the file, ten times as far off as the truth")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[STALLS] * (name == "closed_loop")) for name in NAMES])
+@pytest.mark.parametrize("name", NAMES)
 def test_problem_files_find_the_numbers_of_a_simulated_axis(name: str, tmp_path: Path) -> None:
     """Without the data, too, each file is identified: on runs of the plant that has the published numbers."""
     values = emps.ASYMMETRIC if name.endswith("asymmetric") else emps.SYMMETRIC
