@@ -25,21 +25,23 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     """Return a fit whose integrator steps are short enough, and the model with them.
 
     The first step follows from the fastest mode of the drive; that it suffices for the noise of these recordings shows
-    only now: one Gauss-Newton step on half the integrator step may not move a parameter by more than SHIFT.
+    only now: one Gauss-Newton step on half the integrator step may not move a parameter by more than SHIFT. How short
+    they have to be is found at the fit with the first ones, and fitted once.
     """
     if model.problem.estimation.max_step is not None or isinstance(fitted.program.loss, Absolute):
         return model, fitted
+    program, point, first = fitted.program, fitted.solution.point, model.max_step
     for _ in range(HALVINGS):
         finer = with_step(model, 0.5 * model.max_step)
-        program = replace(fitted.program, experiments=finer.train)
-        point = fitted.solution.point
-        if np.max(_shift(fitted.program, program, point), initial=0.0) <= SHIFT:
+        fine = replace(program, experiments=finer.train)
+        if np.max(_shift(program, fine, point), initial=0.0) <= SHIFT:
             break
-        watch = phases.begin(f"integrator step {finer.max_step:.2g} s")
-        end = solve_gauss_newton(program, point, limits(model), watch)
-        iterations = end.iterations + fitted.solution.iterations
-        model, fitted = finer, Fitted(replace(end, iterations=iterations), program)
-    return model, fitted
+        model, program = finer, fine
+    if model.max_step == first:
+        return model, fitted
+    watch = phases.begin(f"integrator step {model.max_step:.2g} s")
+    end = solve_gauss_newton(program, point, limits(model), watch)
+    return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
 
 
 def _shift(coarse: Program, fine: Program, point: Point) -> FloatArray:
