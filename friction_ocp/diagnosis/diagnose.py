@@ -12,7 +12,7 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, free_errors, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.options import Considered, considered, level_of
 from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
@@ -76,9 +76,8 @@ class Diagnosis:
         They take no part in choosing; but what helps where it was fitted alone explains nothing. Where the innovations
         showed no gap, and only a stated value was wrong, there is none to shrink.
         """
-        doubt = (1.0 + FLOOR_DOUBT) ** 2 - 1.0
         shown = bool(self.accepted) and self.rounds[0].excess.significant(self.level)
-        return not shown or self.after.excess() <= doubt or self.closed.interval95[0] > 0.0
+        return not shown or carries_over(self.before, self.after, self.problem.estimation.seed)
 
     @property
     def unexplained(self) -> bool:

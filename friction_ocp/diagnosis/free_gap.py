@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
 from friction_ocp.estimation.score import FreeRun, simulate_recordings
@@ -81,6 +82,11 @@ def shrink(before: FreeErrors, after: FreeErrors, seed: int) -> Shrink:
     first, then = (np.maximum(item.ratios() - 1.0, 0.0) for item in (before, after))
     by_channel = {name: _share(float(first[k]), float(then[k])) for k, name in enumerate(before.channels)}
     return Shrink(_share(before.excess(), after.excess()), (float(low), float(high)), by_channel)
+
+
+def carries_over(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
+    """Whether free runs come closer than before, at 95 %, or leave nothing but noise whose size is in doubt."""
+    return after.excess() <= (1.0 + FLOOR_DOUBT) ** 2 - 1.0 or shrink(before, after, seed).interval95[0] > 0.0
 
 
 def _share(before: float, after: float) -> float:

@@ -11,7 +11,7 @@ from friction_ocp.diagnosis.bench import Bench, Tell, bettered
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, without_addition
-from friction_ocp.diagnosis.free_gap import free_errors, shrink
+from friction_ocp.diagnosis.free_gap import carries_over, free_errors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.reading import with_additions
@@ -42,8 +42,6 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MINOR = 0.5
-"""Share of what was not noise below which what is left of it is the smaller part."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -166,17 +164,16 @@ class Search:
             self._exchange()
 
     def _helps(self) -> bool:
-        """Whether what was added leaves nothing, explains more than it leaves, or makes free runs better elsewhere.
+        """Whether what was added leaves nothing, or makes free runs better elsewhere.
 
-        Else what is not known is the larger part, and what was added no more than its shadow. Free runs that are lost
-        say nothing.
+        Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
+        runs that are lost say nothing.
         """
         base, current = self.bench.base, self.bench.current
-        left = innovations(current)
-        if not left.significant(self.level) or left.beyond < MINOR * innovations(base).beyond:
+        if not innovations(current).significant(self.level):
             return True
         before, after = (free_errors(fitted, held_out=True) for fitted in (base, current))
-        return before.lost or shrink(before, after, self.bench.problem.estimation.seed).interval95[0] > 0.0
+        return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
         """Decide on an addition to the model of a bench, or on a more general shape of what it has.

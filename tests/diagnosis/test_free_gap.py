@@ -10,7 +10,7 @@ import pytest
 from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.fitting import fit_base
-from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors, gap_map
+from friction_ocp.diagnosis.free_gap import BLOCKS, FreeErrors, carries_over, free_errors, gap_map
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 
@@ -30,3 +30,18 @@ def test_samples_that_a_delay_loses_are_left_out_of_the_map(tmp_path: Path) -> N
     assert len(cells) == len(gap_map(base, before, before))
     for cell in cells:
         assert np.isfinite(cell.before) and cell.before == pytest.approx(cell.after)
+
+
+def errors_of(power: float, seed: int) -> FreeErrors:
+    """Return errors of one channel: in every block their mean square over that of noise, give or take chance."""
+    samples = 200.0
+    blocks = power * np.random.default_rng(seed).chisquare(samples, (BLOCKS, 1))
+    return FreeErrors((), ("position",), np.ones(1), blocks, np.full((BLOCKS, 1), samples))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "carries"), [(9.0, 3.0, True), (9.0, 9.0, False), (9.0, 20.0, False), (1.02, 1.0, True)]
+)
+def test_only_what_comes_closer_elsewhere_carries_over(before: float, after: float, carries: bool) -> None:
+    """Not what leaves free runs as far off as they were or farther; where noise is left there is nothing to close."""
+    assert carries_over(errors_of(before, 1), errors_of(after, 2), 0) is carries
