@@ -33,14 +33,15 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
     A drive that something holds is fitted on its free run at once. One that drifts is fitted on free runs over growing
     windows, where free runs are asked for: from short predictions and, unless that ends at the noise and the friction
     has no part that is hard to start, from the best ends of a fit on relaxed segments. Only free runs are long enough
-    for kinks of the friction to trap them.
+    for kinks of the friction to trap them. All starts have the gaps of the guesses, lest the one with the widest wins.
     """
     options = model.problem.estimation
     phases = Phases(progress, EXPECTED_PHASES * options.starts)
     if not model.train:
         return Fitted(*fit_points(model, phases.begin("static points")))
     starts = [within_reach(model, start) for start in start_points(model.space, options.starts, options.seed)]
-    models = [replace(model, space=model.space.moved(start)) for start in starts]
+    laid = replace(model, found=dict(zip(model.space.names, map(float, model.nominal), strict=True)))
+    models = [replace(laid, space=model.space.moved(start)) for start in starts]
     best = min((_fit_once(item, phases) for item in models), key=lambda fitted: fitted.solution.objective)
     return detour(model, best, phases) if fits_free_run(model) else best
 

@@ -11,10 +11,12 @@ import pytest
 from axes import COULOMB, INERTIA, VISCOUS, axis, measured_axis, problem
 from test_division import model_with, start_of
 
+from friction_ocp.estimation import fit as fitting
 from friction_ocp.estimation.division import are_alike, cut_at, divided, divided_afresh, is_divided, reweighed
 from friction_ocp.estimation.fit import fit, settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.model import Model, laid_for, prepare_fit
+from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
@@ -93,3 +95,21 @@ def test_cuts_are_made_afresh_along_the_motion_at_hand() -> None:
     assert np.array_equal(after.segments[0].first, expected.segments[0].first)
     assert all(begin < end for begin, end in pairwise(after.segments[0].first))
     assert moved.nodes[0] == pytest.approx(point.nodes[0][after.segments[0].first[:-1]])
+
+
+def test_starts_compete_with_the_same_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start at a small inertia, which would allow wide gaps, has those of the guesses."""
+    seen: list[Model] = []
+
+    def noted(model: Model, phases: Phases) -> Fitted:
+        seen.append(model)
+        return once(model, phases)
+
+    once = fitting._fit_once  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(fitting, "_fit_once", noted)
+    model = axis_from(1.0)
+    options = replace(model.problem.estimation, starts=3)
+    fit(replace(model, problem=replace(model.problem, estimation=options)))
+    inertias = {item.space.guess[item.space.names.index("motor.inertia")] for item in seen}
+    assert len(inertias) == 3
+    assert all(np.array_equal(item.nominal, model.space.guess) for item in seen)
