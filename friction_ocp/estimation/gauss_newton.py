@@ -57,7 +57,9 @@ class Tolerances:
     """Predicted decrease that is too small to matter whatever the objective: residuals are in noise floors, so that
     it moves no combination of parameters by more than sqrt(2e-4) of its standard error."""
     progress: float = 1e-6
-    """Actual decrease of three steps in a row, relative to the objective."""
+    """Actual decrease of three steps in a row, relative to the objective, behind which undamped steps are tried."""
+    idle: float | None = None
+    """The same, with which it ends where those lead nowhere; None is as much."""
     stalled: float = 1e-4
     """The same, where no damped step decreases the objective any more (kinks of the friction law)."""
     max_iterations: int = 100
@@ -65,6 +67,11 @@ class Tolerances:
     """Of the first step: small at the end of another fit, where kinks stop small steps and not large ones."""
     inner: int = 0
     """Steps of the nodes alone behind a step without damping that gains nothing by itself; 0 does without."""
+
+    @property
+    def least(self) -> float:
+        """Relative decrease that counts as none."""
+        return self.progress if self.idle is None else min(self.idle, self.progress)
 
 
 USUAL = Tolerances()
@@ -107,7 +114,7 @@ def solve_gauss_newton(
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
     now = _Iterate(point, system, Trust(tolerances.first_damping, np.diag(system.theta_theta)))
-    vanished, slow = VANISHED * system.objective, 0
+    vanished, slow, idle = VANISHED * system.objective, 0, 0
     for iteration in range(1, tolerances.max_iterations + 1):
         following = _descend(program, now, tolerances) or _undamped(program, now, tolerances)
         if following is None:
@@ -117,11 +124,12 @@ def solve_gauss_newton(
         gained = now.system.objective - following.system.objective
         now = following
         slow = slow + 1 if gained <= tolerances.progress * now.system.objective else 0
+        idle = idle + 1 if gained <= tolerances.least * now.system.objective else 0
         if slow >= 3:
             further = _undamped(program, now, tolerances)
-            if further is None:
+            if further is None and idle >= 3:
                 return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
-            now, slow = further, 0
+            now, slow, idle = further or now, 0, idle if further is None else 0
         if watch is not None:
             watch(iteration, now.system.objective, now.point)
     return Solution(now.point, now.system.objective, tolerances.max_iterations, False, "iteration limit reached")
@@ -160,7 +168,7 @@ def _undamped(program: Program, now: _Iterate, tolerances: Tolerances) -> _Itera
     the nodes come back to it on their own.
     """
     space, system = program.space, now.system
-    enough = max(tolerances.progress * system.objective, tolerances.negligible)
+    enough = max(tolerances.least * system.objective, tolerances.negligible)
     trials = [(UNDAMPED, False, 0), (UNDAMPED, True, 0)]
     if tolerances.inner and not program.without_nodes:
         trials += [(damping, False, tolerances.inner) for damping in VALLEY]

@@ -100,8 +100,7 @@ def limits(model: Model) -> Tolerances:
     over many samples a small share of the objective still is a long way.
     """
     samples = max(sum(int(np.isfinite(item.measured).sum()) for item in model.train), 1)
-    progress = min(FINE.progress, LEAST / (0.5 * samples))
-    return replace(FINE, progress=progress, max_iterations=model.problem.estimation.max_iterations)
+    return replace(FINE, idle=LEAST / (0.5 * samples), max_iterations=model.problem.estimation.max_iterations)
 
 
 def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
