@@ -61,10 +61,10 @@ def motions_of(model: Model, numbers: FloatArray, item: Experiment, nodes: IntAr
     mech, states = model.drive.mechanism, np.zeros((nodes.size, len(model.drive.state_names)))
     if not mech.bristles:
         return states
-    found, _ = model.sweep.start.map(nodes.size)(*(signal.T for signal in item.signals(nodes)), numbers)
+    found = model.sweep.start_states(item.signals(nodes), numbers)
     angles = len(mech.angle_groups)
     rubbing = slice(angles, angles + len(mech.free_groups) + len(mech.bristle_names))
-    states[:, rubbing] = np.asarray(found).T[:, rubbing]
+    states[:, rubbing] = found[:, rubbing]
     return states
 
 

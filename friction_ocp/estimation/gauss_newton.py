@@ -21,6 +21,9 @@ UNDAMPED = 1e-9
 """Damping of the step whose predicted decrease decides about the end: it sees directions that damping hides."""
 VALLEY = (UNDAMPED, 1e-4, 1e-2)
 """The same for steps behind which the nodes are solved for on their own."""
+PATIENCE = 3
+"""Steps in a row that gain next to nothing before those without damping are tried; twice as many after each time that
+these led nowhere."""
 FLAT = 1e-6
 """Curvature of a parameter over the largest on the way below which an end has left where the data see it."""
 LOST, BLIND = 1e-8, 1e3
@@ -57,7 +60,7 @@ class Tolerances:
     """Predicted decrease that is too small to matter whatever the objective: residuals are in noise floors, so that
     it moves no combination of parameters by more than sqrt(2e-4) of its standard error."""
     progress: float = 1e-6
-    """Actual decrease of three steps in a row, relative to the objective, behind which undamped steps are tried."""
+    """Actual decrease of a step, relative to the objective, below which steps without damping are due."""
     idle: float | None = None
     """The same, with which it ends where those lead nowhere; None is as much."""
     stalled: float = 1e-4
@@ -114,7 +117,7 @@ def solve_gauss_newton(
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
     now = _Iterate(point, system, Trust(tolerances.first_damping, np.diag(system.theta_theta)))
-    vanished, slow, idle = VANISHED * system.objective, 0, 0
+    vanished, slow, idle, patience = VANISHED * system.objective, 0, 0, PATIENCE
     for iteration in range(1, tolerances.max_iterations + 1):
         following = _descend(program, now, tolerances) or _undamped(program, now, tolerances)
         if following is None:
@@ -125,11 +128,12 @@ def solve_gauss_newton(
         now = following
         slow = slow + 1 if gained <= tolerances.progress * now.system.objective else 0
         idle = idle + 1 if gained <= tolerances.least * now.system.objective else 0
-        if slow >= 3:
+        if slow >= patience or idle >= PATIENCE:
             further = _undamped(program, now, tolerances)
-            if further is None and idle >= 3:
+            if further is None and idle >= PATIENCE:
                 return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
-            now, slow, idle = further or now, 0, idle if further is None else 0
+            slow, patience = 0, 2 * patience if further is None else PATIENCE
+            now, idle = further or now, idle if further is None else 0
         if watch is not None:
             watch(iteration, now.system.objective, now.point)
     return Solution(now.point, now.system.objective, tolerances.max_iterations, False, "iteration limit reached")

@@ -263,10 +263,7 @@ def _signals(problem: Problem, name: str) -> list[tuple[FloatArray, FloatArray]]
 
 
 def _suggested(sweep: Sweep, space: ParameterSpace, item: Experiment, theta: FloatArray) -> FloatArray:
-    numbers = space.numbers(theta, item.name)
-    signals = item.signals(slice(None))
-    value, _ = sweep.start.map(item.grid.time.size)(*(signal.T for signal in signals), numbers)
-    return np.asarray(value).T
+    return sweep.start_states(item.signals(slice(None)), space.numbers(theta, item.name))
 
 
 def _scale_of_points(drive: SteppedDrive, static: tuple[StaticTerm, ...]) -> FloatArray:

@@ -133,7 +133,7 @@ class Program:
         if not states or not len(nodes):
             return np.zeros((len(nodes), states)), np.zeros((len(nodes), states, theta.size))
         numbers, slope = self.space.numbers_and_slope(theta, item.name)
-        many = self.sweep.start.map(len(nodes))
+        many = self.sweep.starts(len(nodes))
         value, by_active = many(*(signal.T for signal in item.signals(nodes)), numbers)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
@@ -165,7 +165,7 @@ class Program:
         pairs = zip(self.experiments, self.segments, strict=True)
         columns = [item.signals(cut.first[: cut.measured]) for item, cut in pairs]
         signals = tuple(np.concatenate(signal).T for signal in zip(*columns, strict=True))
-        return self.sweep.start.map(sum(cut.measured for cut in self.segments)), signals
+        return self.sweep.starts(sum(cut.measured for cut in self.segments)), signals
 
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""

@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy.interpolate as _interpolate  # pyright: ignore[reportMissingTypeStubs]
 import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
+import scipy.optimize as _optimize  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.recording import FloatArray
 
 interpolate: Any = _interpolate  # its own types are incomplete
 linalg: Any = _linalg
+optimize: Any = _optimize
 
 _MAD_TO_STD = 1.4826
 _MIN_LEVELS = 5
@@ -145,11 +147,14 @@ def _present(time: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, Fl
 def _fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
     """Return fourth divided differences over five neighbours, scaled so that white noise keeps its deviation."""
     times = np.lib.stride_tricks.sliding_window_view(t / np.mean(np.diff(t)), 5)
-    distance = times[:, :, None] - times[:, None, :]
-    weights = 1.0 / np.prod(distance + np.eye(5), axis=2)
-    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
     windows = np.lib.stride_tricks.sliding_window_view(y, 5)
-    return np.sum(weights * (windows - windows[:, 2:3]), axis=1)
+    total, squares = np.zeros(len(times)), np.zeros(len(times))
+    for k in range(5):
+        others = [times[:, k] - times[:, j] for j in range(5) if j != k]
+        weight = 1.0 / (others[0] * others[1] * others[2] * others[3])
+        total += weight * (windows[:, k] - windows[:, 2])
+        squares += weight**2
+    return total / np.sqrt(squares)
 
 
 def _common_divisor(gaps: FloatArray, rounding: float) -> float | None:
@@ -206,15 +211,15 @@ def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:
 
 
 def _penalty_for_noise(t: FloatArray, y: FloatArray, noise_std: float) -> float:
-    """Return the penalty that leaves a residual of the noise floor, by bisection on its logarithm; 0 to interpolate."""
+    """Return the penalty that leaves a residual of the noise floor, by its logarithm; 0 to interpolate."""
 
-    def residual(exponent: float) -> float:
-        return float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**exponent)) ** 2)))
+    def excess(exponent: float) -> float:
+        residual = float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**exponent)) ** 2)))
+        return float(np.log(max(residual, 1e-300) / noise_std))
 
     low, high = -4.0, 12.0
-    if not noise_std > residual(low):
+    if not noise_std > 0.0 or excess(low) >= 0.0:
         return 0.0
-    for _ in range(20):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if residual(middle) < noise_std else (low, middle)
-    return 10.0 ** (0.5 * (low + high))
+    if excess(high) <= 0.0:
+        return 10.0**high
+    return 10.0 ** float(optimize.brentq(excess, low, high, xtol=1e-5))

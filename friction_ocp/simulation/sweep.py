@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import lru_cache
 
 import casadi as ca
+import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import SteppedDrive, stepped
@@ -17,6 +19,11 @@ from friction_ocp.simulation.kernel import AbstractKernel, Piece, SweepRequest, 
 
 __all__ = ["Sweep", "SweepRequest", "SweepResult", "sweep_of"]
 
+TOGETHER = 1024
+"""Nodes whose start states are evaluated in one call: CasADi's maps take long to make where they are long."""
+MAPS = 16
+"""Maps of the start states that a sweep keeps."""
+
 
 class Sweep:
     """The one-step functions of a drive, looped over grids."""
@@ -26,9 +33,21 @@ class Sweep:
         self.active = tuple(active)
         self.start = _start_with_slope(drive, self.active)
         """(y, dy, ddy, u, p) -> start state and its derivative by the active numbers."""
+        self.starts = lru_cache(MAPS)(self.start.map)
+        """The same at as many nodes as asked for."""
+        self._states = lru_cache(MAPS)(drive.start.map)
         self.kernel: AbstractKernel = compile_sweep(drive, self.active, values_only) or InterpretedKernel(
             drive, self.active
         )
+
+    def start_states(self, signals: Sequence[FloatArray], p: FloatArray) -> FloatArray:
+        """Return (k, states) start states at k nodes from the signals there: y, dy, ddy, u, (k, channels) each."""
+        count = len(signals[0])
+        states = np.zeros((count, len(self.drive.state_names)))
+        for first in range(0, count, TOGETHER):
+            block = [signal[first : first + TOGETHER].T for signal in signals]
+            states[first : first + TOGETHER] = np.asarray(self._states(block[0].shape[1])(*block, p)).T
+        return states
 
     def run(
         self,
