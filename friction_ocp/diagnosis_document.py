@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,8 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         **heading(problem),
         "verdict": diagnosis.verdict,
         "where": _where(diagnosis),
-        "rounds": [_round(diagnosis, k) for k in range(len(diagnosis.rounds))],
+        "rounds": _rounds(diagnosis, diagnosis.rounds),
+        "superseded": _rounds(diagnosis, diagnosis.superseded),
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
         "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
         "cannot_tell": [_blind_spot(item, problem.drive) for item in diagnosis.blind],
@@ -138,9 +139,15 @@ def _curve(found: Shape, drive: Drive) -> dict[str, Any]:
     return {"component": found.component, "variable": found.variable, **units, **numbers}
 
 
-def _round(diagnosis: Diagnosis, index: int) -> dict[str, Any]:
-    item = diagnosis.rounds[index]
-    earlier = {done.accepted.key for done in diagnosis.rounds[:index] if done.accepted is not None}
+def _rounds(diagnosis: Diagnosis, rounds: Sequence[Round]) -> list[dict[str, Any]]:
+    earlier, found = set[Key](), list[dict[str, Any]]()
+    for item in rounds:
+        found.append(_round(diagnosis, item, item.accepted is not None and item.accepted.key in earlier))
+        earlier |= set() if item.accepted is None else {item.accepted.key}
+    return found
+
+
+def _round(diagnosis: Diagnosis, item: Round, reshaped: bool) -> dict[str, Any]:
     gap = item.accepted is not None or item.excess.significant(diagnosis.level) or diagnosis.left_over
     available = max(item.before.objective - 0.5 * samples(item.before), 1e-300)
     pairs = zip(item.choice.rivals, item.choice.probabilities, strict=True)
@@ -163,7 +170,7 @@ def _round(diagnosis: Diagnosis, index: int) -> dict[str, Any]:
         "probabilities": dict(probabilities(item.choice, gap)),
         "excess": {"ratio": item.excess.ratio, "p_value": item.excess.p_value},
         "accepted": None if item.accepted is None else _named(item.accepted.key),
-        "reshaped": item.accepted is not None and item.accepted.key in earlier,
+        "reshaped": reshaped,
         "causes": causes,
     }
 

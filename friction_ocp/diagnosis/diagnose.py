@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,6 +14,7 @@ from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
+from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.options import Considered, considered, level_of
 from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
@@ -36,6 +38,9 @@ class Diagnosis:
     base: FittedModel
     final: FittedModel
     rounds: tuple[Round, ...]
+    """Those whose decision stood, as sure as they are in hindsight."""
+    superseded: tuple[Round, ...]
+    """Those whose addition was taken back, because what came later makes it superfluous."""
     accepted: tuple[Key, ...]
     level: float
     before: FreeErrors
@@ -76,8 +81,8 @@ class Diagnosis:
         They take no part in choosing; but what helps where it was fitted alone explains nothing. Where the innovations
         showed no gap, and only a stated value was wrong, there is none to shrink.
         """
-        shown = bool(self.accepted) and self.rounds[0].excess.significant(self.level)
-        return not shown or carries_over(self.before, self.after, self.problem.estimation.seed)
+        shown = any(item.excess.significant(self.level) for item in (*self.rounds, *self.superseded))
+        return not (self.accepted and shown) or carries_over(self.before, self.after, self.problem.estimation.seed)
 
     @property
     def unexplained(self) -> bool:
@@ -159,22 +164,33 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         search.go()
     rounds, accepted = search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)
-    rounds, clues, left = [*rounds, *checked], clues_of(current), innovations(current)
+    clues, left = clues_of(current), innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
-    return Diagnosis(
-        problem=problem,
-        base=base,
-        final=current,
-        rounds=tuple(rounds),
-        accepted=tuple(dict.fromkeys(accepted)),
-        level=level,
-        before=free_errors(base, held_out=True),
-        after=free_errors(current, held_out=True),
-        remainder=left,
-        slow=slow_torques(current, clues),
-        blind=blind_spots(current, left, clues, meant),
-        seconds=time.perf_counter() - began,
+    stood, superseded = standing(merged(rounds, checked), accepted)
+    return _in_hindsight(
+        Diagnosis(
+            problem=problem,
+            base=base,
+            final=current,
+            rounds=tuple(stood),
+            superseded=tuple(superseded),
+            accepted=tuple(dict.fromkeys(accepted)),
+            level=level,
+            before=free_errors(base, held_out=True),
+            after=free_errors(current, held_out=True),
+            remainder=left,
+            slow=slow_torques(current, clues),
+            blind=blind_spots(current, left, clues, meant),
+            seconds=time.perf_counter() - began,
+        )
     )
+
+
+def _in_hindsight(found: Diagnosis) -> Diagnosis:
+    """Return a diagnosis whose rounds are as sure as its end lets them be."""
+    closed = found.closed.overall
+    lost = 0.0 if found.carries_over else 1.0 - (min(max(closed, 0.0), 1.0) if math.isfinite(closed) else 0.0)
+    return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, lost)))
 
 
 def _checked(current: FittedModel, meant: Considered, level: float) -> tuple[FittedModel, list[Round]]:

@@ -14,6 +14,7 @@ from friction_ocp.report.diagnosis_words import (
     blind_spot_sentences,
     diagnosis_sentence,
     round_sentence,
+    superseded_sentences,
 )
 from friction_ocp.report.page import paragraphs, render_page
 from friction_ocp.report.pictures import embedded_png
@@ -44,6 +45,7 @@ def render_diagnosis(result: Json, figures: Mapping[str, Path]) -> str:
             "drifts": result.get("verdict") in ("no_gap", "explained"),
             "gap": [_gap_row(name, gap) for name in objects(gap, "before")],
             "rounds": [_round(item) for item in rows(result, "rounds")],
+            "superseded": superseded_sentences(result),
             "aliases": alias_sentences(result),
             "blind": blind_spot_sentences(result),
             "biased": bias_sentences(result),

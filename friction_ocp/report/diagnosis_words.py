@@ -9,6 +9,8 @@ from friction_ocp.plots.reading import Json, part, rows
 
 NEARLY_ALL = 0.999
 """Share of the gap beyond which it is not told more closely."""
+NOTABLE = 0.05
+"""Probability from which it is told that an addition stands in for something unknown."""
 
 
 def diagnosis_sentence(result: Json) -> str:
@@ -25,9 +27,8 @@ def diagnosis_sentence(result: Json) -> str:
             return f"There is a gap, and several causes fit it: {likely}."
         case _ if accepted:
             found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
-            return (
-                f"{found}; what is left{_place(result)} is more than noise, and nothing in the catalogue explains it."
-            )
+            left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
+            return f"{found}; {left}{_stand_ins(result)}."
         case _:
             return f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
 
@@ -41,6 +42,17 @@ def _with_rivals(result: Json) -> list[str]:
         doubt = f" (or {' or '.join(others)}: these recordings cannot tell)" if others else ""
         found.append(f"{name}{doubt}")
     return found
+
+
+def _stand_ins(result: Json) -> str:
+    """Say which accepted effects may stand in for what is not known."""
+    doubts = {
+        _named(part(item, "accepted")): float(part(item, "probabilities")["outside_catalogue"])
+        for item in rows(result, "rounds")
+        if item.get("accepted")
+    }
+    worth = [f"{name} ({whole_percent(chance)})" for name, chance in doubts.items() if chance >= NOTABLE]
+    return f". It may be the cause of what was put down to others, too: {_listed(worth)}" if worth else ""
 
 
 def round_sentence(item: Json) -> str:
@@ -59,6 +71,14 @@ def round_sentence(item: Json) -> str:
         f"{decided} {when} the errors of one-step predictions have {power} times the power of their noise. "
         f"Probability that nothing is missing: {none}; that the cause is outside the catalogue: {outside}."
     )
+
+
+def superseded_sentences(result: Json) -> list[str]:
+    """Say what was added on the way and taken back."""
+    names = [_named(part(item, "accepted")) for item in rows(result, "superseded")]
+    if not names:
+        return []
+    return [f"Added on the way and taken back, because what was found later makes it superfluous: {_listed(names)}."]
 
 
 def alias_sentences(result: Json) -> list[str]:
@@ -110,6 +130,7 @@ def diagnosis_summary(result: Json) -> str:
         lines.append(f"round {number}: {round_sentence(item)}")
         for cause in rows(item, "causes")[:3]:
             lines.append(f"  {_named(cause)}: probability {whole_percent(cause['probability'])}")
+    lines += superseded_sentences(result)
     lines += [f"cannot be told apart: {line}" for line in alias_sentences(result)]
     lines += blind_spot_sentences(result)
     lines += [f"biased before: {line}" for line in bias_sentences(result)]

@@ -35,6 +35,9 @@ def test_an_inertia_beyond_three_deviations_of_its_prior_is_named(
     document = diagnosis_document(found)
     assert document["verdict"] == ("explained" if accepted else "no_gap")
     assert [list(item["parameters"]) for item in document["accepted"]] == [["motor.inertia"]] * len(accepted)
+    (only,) = document["rounds"]  # that nothing else is missing is no statement of its own beside a wrong value
+    assert (only["probabilities"]["no_effect"] > 0.9) == (not accepted)
+    assert {"stribeck", "sensor_delay"} <= {cause["effect"] for cause in only["causes"]}
 
 
 def test_a_fixed_value_is_named_before_the_fitted_ones_that_gave_way_to_it(tmp_path: Path) -> None:

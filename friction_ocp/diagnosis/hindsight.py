@@ -1,0 +1,61 @@
+"""What the end of a diagnosis says of its rounds: decisions that did not stand, and how sure the others still are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.select import Choice, Round
+from friction_ocp.diagnosis.worth import Key, samples
+
+MIMICKED = 0.01
+"""Probability that what leaves nothing stands in for something outside the catalogue: it did in 2 of the 191 cases of
+the blind suites of seeds 20261125 to 20261127 where a cause was named and noise was left."""
+
+
+def merged(rounds: Sequence[Round], checked: Sequence[Round]) -> list[Round]:
+    """Return the rounds with those of stated values behind them.
+
+    Where stated values are taken back the round before, which found that nothing is missing, did not stand: it lacked
+    these candidates.
+    """
+    if not checked or not rounds or rounds[-1].accepted is not None:
+        return [*rounds, *checked]
+    return [*rounds[:-1], replace(checked[0], screened=rounds[-1].screened), *checked[1:]]
+
+
+def standing(rounds: Sequence[Round], accepted: Sequence[Key]) -> tuple[list[Round], list[Round]]:
+    """Return the rounds whose addition was kept, or that found none, and those whose addition was taken back later."""
+    stood = [item.accepted is None or item.accepted.key in accepted for item in rounds]
+    kept = [item for item, yes in zip(rounds, stood, strict=True) if yes]
+    return kept, [item for item, yes in zip(rounds, stood, strict=True) if not yes]
+
+
+def doubted(rounds: Sequence[Round], final: FittedModel, left_over: bool, lost: float) -> list[Round]:
+    """Return rounds whose additions are as sure as what is left at the end lets them be.
+
+    Where nothing explains what is left, an addition may be no more than what comes nearest to one unknown cause of
+    both: it is doubted by as large a share as what is left has in it and the addition together. `lost` is the share of
+    the gap that is left on recordings that took no part, where nothing is left on the others.
+    """
+    return [item if item.accepted is None else _doubted(item, final, left_over, lost) for item in rounds]
+
+
+def _doubted(item: Round, final: FittedModel, left_over: bool, lost: float) -> Round:
+    assert item.accepted is not None
+    left = max(_excess(final), 0.0) if left_over else 0.0
+    taken = max(item.before.objective - item.accepted.standing.objective, 0.0)
+    share = left / (left + taken) if left > 0.0 else lost
+    return replace(item, choice=_less_sure(item.choice, min(max(share, MIMICKED), 1.0)))
+
+
+def _excess(fitted: FittedModel) -> float:
+    """Return the objective beyond that of noise."""
+    return fitted.objective - 0.5 * samples(fitted)
+
+
+def _less_sure(choice: Choice, share: float) -> Choice:
+    """Return a choice whose rivals leave a share of what they are worth to no rival at all."""
+    chances = tuple((1.0 - share) * chance for chance in choice.probabilities)
+    return replace(choice, probabilities=chances, nothing=choice.nothing + share * sum(choice.probabilities))

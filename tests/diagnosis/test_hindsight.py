@@ -1,0 +1,69 @@
+"""What the end of a diagnosis says of its rounds."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.hindsight import MIMICKED, doubted, merged, standing
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.select import NOTHING, Choice, Round
+
+SAMPLES = 1000
+NOISE = 0.5 * SAMPLES
+
+
+def fitted(objective: float) -> FittedModel:
+    """Return what ends at an objective; that of noise is `NOISE`."""
+    rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
+    return cast(FittedModel, SimpleNamespace(objective=objective, linear=SimpleNamespace(rows=rows)))
+
+
+def decided(effect: str | None, before: float, after: float = 0.0, screened: tuple[Any, ...] = ()) -> Round:
+    """Return a round that adds an effect at the motor, as one of two rivals, or none."""
+    if effect is None:
+        return Round(screened, NOTHING, fitted(before), cast(Any, None), None)
+    best = cast(Rival, SimpleNamespace(key=(effect, "motor"), standing=fitted(after)))
+    choice = Choice((best, cast(Rival, SimpleNamespace(key=("warm_up", "motor")))), (0.9, 0.06), 0.04, True, (best,))
+    return Round(screened, choice, fitted(before), cast(Any, None), best)
+
+
+def test_what_leaves_nothing_is_as_sure_as_explanations_are() -> None:
+    item = doubted([decided("cogging", NOISE + 400.0, NOISE)], fitted(NOISE + 3.0), False, 0.0)[0]
+    assert item.choice.probabilities == pytest.approx((0.9 * (1 - MIMICKED), 0.06 * (1 - MIMICKED)))
+    assert sum(item.choice.probabilities) + item.choice.nothing == pytest.approx(1.0)
+
+
+def test_what_leaves_as_much_as_it_takes_may_well_be_a_stand_in() -> None:
+    """The first of two additions takes 300 and the second 50; 100 are left that nothing explains."""
+    rounds = [decided("cogging", NOISE + 450.0, NOISE + 150.0), decided("stribeck", NOISE + 150.0, NOISE + 100.0)]
+    first, second = doubted(rounds, fitted(NOISE + 100.0), True, 0.0)
+    assert first.choice.nothing == pytest.approx(0.04 + 0.96 * 100.0 / 400.0)
+    assert second.choice.nothing == pytest.approx(0.04 + 0.96 * 100.0 / 150.0)
+
+
+def test_what_does_not_carry_over_is_doubted_by_what_is_left_elsewhere() -> None:
+    rounds = [decided("cogging", NOISE + 400.0, NOISE), decided(None, NOISE)]
+    first, last = doubted(rounds, fitted(NOISE), False, 0.8)
+    assert first.choice.nothing == pytest.approx(0.04 + 0.96 * 0.8)
+    assert last is rounds[1]
+
+
+def test_rounds_whose_addition_was_taken_back_do_not_stand() -> None:
+    rounds = [decided("torque_ripple", 900.0), decided("compliance", 700.0), decided(None, 500.0)]
+    kept, superseded = standing(rounds, [("compliance", "motor")])
+    assert kept == [rounds[1], rounds[2]]
+    assert superseded == [rounds[0]]
+
+
+def test_that_nothing_is_missing_does_not_stand_beside_a_wrong_stated_value() -> None:
+    seen: tuple[Any, ...] = ("all candidates",)
+    found, checked = decided(None, 500.0, screened=seen), decided("inertia_error", 500.0)
+    assert [(item.accepted, item.screened) for item in merged([found], [checked])] == [(checked.accepted, seen)]
+    assert merged([found], []) == [found]
+    other = decided("cogging", 900.0)
+    assert merged([other], [checked]) == [other, checked]
