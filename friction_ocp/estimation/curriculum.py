@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.estimation.division import cut_at, divided
+from friction_ocp.estimation.division import cut_at, divided, is_divided
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
+from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model, laid_for
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
@@ -27,6 +28,16 @@ RENEWALS, WORTHWHILE = 10, 1e-4
 def may_enter_in_turn(model: Model) -> bool:
     """Whether recordings can come in one by one: there are several, and every parameter is shared by them."""
     return len(model.train) > 1 and not any("@" in name for name in model.space.names)
+
+
+def enter_in_turn(model: Model) -> bool:
+    """Whether recordings come in one by one: where they may, and static points are there to begin with."""
+    return bool(model.static) and may_enter_in_turn(model)
+
+
+def may_be_cut(model: Model, program: Program) -> bool:
+    """Whether segments are relaxed, and cut where differences grow: where they have been, or would have been."""
+    return not fits_free_run(model) and (is_divided(model, program) or enter_in_turn(model))
 
 
 def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:

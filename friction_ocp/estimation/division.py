@@ -56,6 +56,13 @@ def reweighed(model: Model, program: Program) -> Program:
     return cut_at(model, program, [cut.first for cut in program.segments])
 
 
+def moved_share(program: Program, other: Program) -> float:
+    """Return the share of cuts that two programs of the same recordings do not have in common."""
+    pairs = list(zip(program.segments, other.segments, strict=True))
+    moved = sum(np.setxor1d(cut.first, its.first).size for cut, its in pairs)
+    return moved / max(sum(cut.count + its.count for cut, its in pairs), 1)
+
+
 def are_alike(program: Program, other: Program, share: float) -> bool:
     """Whether two programs are cut alike and their gaps differ by less than a share of their size."""
     for cut, before in zip(program.segments, other.segments, strict=True):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from friction_ocp.estimation.curriculum import may_be_cut
 from friction_ocp.estimation.detours import detour, hop
-from friction_ocp.estimation.division import are_alike, divided_afresh, is_divided, reweighed
+from friction_ocp.estimation.division import are_alike, divided_afresh, moved_share, reweighed
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
 from friction_ocp.estimation.model import Model, laid_for
@@ -22,9 +23,11 @@ from friction_ocp.estimation.synchronise import synchronised
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
 CUTS = 2
-"""Turns in which segments are cut where differences grow along what was found; later ones keep them."""
+"""Turns in which segments are cut where differences grow along what was found; later ones keep them as long as they
+are nearly where they would be cut afresh."""
 SETTLED = 0.01
-"""Relative change of the size of a gap, as inertias, stiffnesses and torque noise are found, below which none moves."""
+"""Relative change of the size of a gap, as inertias, stiffnesses and torque noise are found, below which none moves;
+and share of the cuts that may be elsewhere than where they belong."""
 
 
 def fit(model: Model, progress: Progress = silent) -> Fitted:
@@ -50,27 +53,29 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
 
     Return the model with these stamps, levels and steps. Shorter steps move the kinks of exact friction, and what was
-    the best end between them need not be it any more.
+    the best end between them need not be it any more; nor need segments be cut where they should be.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
     model, fitted = synchronised(model, fit(model, progress), phases)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
     finer, fitted = refined(model, fitted, phases)
-    if finer is not model and fits_free_run(model):
-        fitted = detour(finer, fitted, phases)
-    return finer, fitted
+    if finer is model:
+        return model, fitted
+    if fits_free_run(model):
+        return finer, detour(finer, fitted, phases)
+    return relaid(finer, fitted, phases, CUTS)
 
 
-def relaid(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
+def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:
     """Lay the gaps between segments for what was found, fit again, and so on until no gap moves; return both.
 
     What a torque noise gathers in a gap hangs on the inertia, and the size of a bristle on its stiffness: with gaps
     laid for the guesses the answer would hang on them. Torque noise that is asked for is estimated along the fit, too.
-    Where free runs are fitted there are no gaps, and the noise is only reported.
+    Where free runs are fitted there are no gaps, and the noise is only reported. `done` turns were made before.
     """
     asked, joined = model.problem.estimation.estimated_noise, not fits_free_run(model)
-    for turn in range(MOST_TURNS):
+    for turn in range(done, MOST_TURNS):
         point = fitted.solution.point
         if joined:
             model = laid_for(model, dict(zip(model.space.names, map(float, point.theta), strict=True)))
@@ -79,8 +84,10 @@ def relaid(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]
         if not joined:
             break
         program = reweighed(model, fitted.program)
-        if is_divided(model, program) and turn < CUTS:
-            program, point = divided_afresh(model, program, point)
+        if may_be_cut(model, program):
+            afresh, there = divided_afresh(model, program, point)
+            if turn < CUTS or moved_share(afresh, program) > SETTLED:
+                program, point = afresh, there
         if are_alike(program, fitted.program, SETTLED):
             return model, Fitted(replace(fitted.solution, objective=program.objective(point)), program)
         watch = phases.begin(f"gaps between segments, turn {turn + 1}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +19,12 @@ TRUSTED = 1e-2
 """Damping up to which a small predicted decrease is taken for the end rather than for a short step."""
 UNDAMPED = 1e-9
 """Damping of the step whose predicted decrease decides about the end: it sees directions that damping hides."""
-VALLEY = (UNDAMPED, 1e-4, 1e-2)
-"""The same for steps behind which the nodes are solved for on their own."""
+VALLEY, WIDEST = 1e-4, 1e-1
+"""Damping of the first step behind which the nodes are solved for on their own, and the most; that of the next one is
+a tenth of what led on."""
 PATIENCE = 3
-"""Steps in a row that gain next to nothing before those without damping are tried; twice as many after each time that
-these led nowhere."""
+"""Steps in a row that gain next to nothing before those without damping are tried. Where these led nowhere they are
+tried again when the objective has fallen by more than next to nothing, and before the end."""
 FLAT = 1e-6
 """Curvature of a parameter over the largest on the way below which an end has left where the data see it."""
 LOST, BLIND = 1e-8, 1e3
@@ -106,6 +107,8 @@ class _Iterate:
     trust: Trust
     bold: bool = True
     """Whether the first trial of the step before was taken: the next one is then linearised at once."""
+    along: float | None = None
+    """Damping of the step along a valley that led here, if one did."""
 
 
 def solve_gauss_newton(
@@ -117,9 +120,9 @@ def solve_gauss_newton(
     if not np.isfinite(system.objective):
         return Solution(point, system.objective, 0, False, "the simulation breaks down at the start values")
     now = _Iterate(point, system, Trust(tolerances.first_damping, np.diag(system.theta_theta)))
-    vanished, slow, idle, patience = VANISHED * system.objective, 0, 0, PATIENCE
+    vanished, slow, idle, valley = VANISHED * system.objective, 0, 0, VALLEY
     for iteration in range(1, tolerances.max_iterations + 1):
-        following = _descend(program, now, tolerances) or _undamped(program, now, tolerances)
+        following = _descend(program, now, tolerances) or _undamped(program, now, tolerances, valley)
         if following is None:
             return _stuck(program, now, iteration, tolerances, vanished)
         if following is now:
@@ -128,12 +131,15 @@ def solve_gauss_newton(
         now = following
         slow = slow + 1 if gained <= tolerances.progress * now.system.objective else 0
         idle = idle + 1 if gained <= tolerances.least * now.system.objective else 0
-        if slow >= patience or idle >= PATIENCE:
-            further = _undamped(program, now, tolerances)
+        if slow >= PATIENCE or idle >= PATIENCE:
+            further = _undamped(program, now, tolerances, valley)
             if further is None and idle >= PATIENCE:
                 return _ended(program, now, iteration, "three steps in a row gained next to nothing", smooth=False)
-            slow, patience = 0, 2 * patience if further is None else PATIENCE
-            now, idle = further or now, idle if further is None else 0
+            if further is None:
+                slow = 0
+            else:
+                valley = further.along or valley
+                slow, idle, now = PATIENCE - 1 if further.along else 0, 0, further
         if watch is not None:
             watch(iteration, now.system.objective, now.point)
     return Solution(now.point, now.system.objective, tolerances.max_iterations, False, "iteration limit reached")
@@ -162,32 +168,40 @@ def _descend(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterat
     return None
 
 
-def _undamped(program: Program, now: _Iterate, tolerances: Tolerances) -> _Iterate | None:
+def _undamped(program: Program, now: _Iterate, tolerances: Tolerances, valley: float) -> _Iterate | None:
     """Return what follows a step without damping where that gains more than next to nothing.
 
     Parameters that are well seen one by one and hardly seen together, such as a torque constant and all that it is
     traded for, have a long way to go along which damping, which looks at each, lets them creep. Nodes that rest at
     kinks have steps of their own that lead nowhere: in a second trial nodes do no more than follow the parameters.
     Along a curved valley of parameters and nodes every straight step loses: in further trials, if they are asked for,
-    the nodes come back to it on their own.
+    the nodes come back to it on their own. How far the valley is followed at once is a matter of trial; `valley` is the
+    damping that led on the last time.
     """
-    space, system = program.space, now.system
-    enough = max(tolerances.least * system.objective, tolerances.negligible)
     trials = [(UNDAMPED, False, 0), (UNDAMPED, True, 0)]
     if tolerances.inner and not program.without_nodes:
-        trials += [(damping, False, tolerances.inner) for damping in VALLEY]
+        trials += [(damping, False, tolerances.inner) for damping in _dampings(0.1 * valley)]
+    enough = max(tolerances.least * now.system.objective, tolerances.negligible)
     for damping, follow, inner in trials:
-        trial, predicted = trial_step(space, now.point, system, damping, now.trust.scale, follow)
+        trial, predicted = trial_step(program.space, now.point, now.system, damping, now.trust.scale, follow)
         if predicted <= enough:
             continue
         trial = solve_nodes(program, trial, inner) if inner else trial
-        if not system.objective - program.objective(trial) > enough:
+        if not now.system.objective - program.objective(trial) > enough:
             continue
         after = program.linearise(trial)
         if not np.any(_faded(after, now.trust.scale, LOST)):
-            gained = system.objective - after.objective
-            return _Iterate(trial, after, Trust(damping, now.trust.scale).after(gained / predicted, after))
+            gained = now.system.objective - after.objective
+            trust = Trust(damping, now.trust.scale).after(gained / predicted, after)
+            return _Iterate(trial, after, trust, along=damping if inner else None)
     return None
+
+
+def _dampings(first: float) -> Iterator[float]:
+    damping = max(first, UNDAMPED)
+    while damping <= 1.001 * WIDEST:
+        yield damping
+        damping *= 100.0
 
 
 def _remaining(program: Program, now: _Iterate) -> float:

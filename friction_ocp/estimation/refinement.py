@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.estimation.curriculum import may_be_cut
+from friction_ocp.estimation.division import divided_afresh
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model, with_step
@@ -39,6 +41,8 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
         model, program = finer, fine
     if model.max_step == first:
         return model, fitted
+    if may_be_cut(model, program):
+        program, point = divided_afresh(model, program, point)
     watch = phases.begin(f"integrator step {model.max_step:.2g} s")
     end = solve_gauss_newton(program, point, limits(model), watch)
     return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from friction_ocp.estimation.composite import solve_composite
-from friction_ocp.estimation.curriculum import introduced, may_enter_in_turn
+from friction_ocp.estimation.curriculum import enter_in_turn, introduced
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
@@ -110,7 +110,7 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     """
     conclusive = plan.conclusive and model.problem.estimation.loss == "squares"
     ends: list[Fitted] = []
-    if conclusive and plan.builder is joined and model.static and may_enter_in_turn(model):
+    if conclusive and plan.builder is joined and enter_in_turn(model):
         ends.append(Fitted(*introduced(model, phases)))
         if is_sound(model, ends[0]):
             return ends

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,20 @@ from axes import COULOMB, INERTIA, VISCOUS, axis, measured_axis, problem
 from test_division import model_with, start_of
 
 from friction_ocp.estimation import fit as fitting
-from friction_ocp.estimation.division import are_alike, cut_at, divided, divided_afresh, is_divided, reweighed
+from friction_ocp.estimation.division import (
+    are_alike,
+    cut_at,
+    divided,
+    divided_afresh,
+    is_divided,
+    moved_share,
+    reweighed,
+)
 from friction_ocp.estimation.fit import fit, settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.model import Model, laid_for, prepare_fit
-from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.progress import Phases, silent
 from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
@@ -95,6 +105,37 @@ def test_cuts_are_made_afresh_along_the_motion_at_hand() -> None:
     assert np.array_equal(after.segments[0].first, expected.segments[0].first)
     assert all(begin < end for begin, end in pairwise(after.segments[0].first))
     assert moved.nodes[0] == pytest.approx(point.nodes[0][after.segments[0].first[:-1]])
+
+
+def test_cuts_that_are_not_where_they_belong_are_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind the turns that always cut, too; those that are nearly there are kept."""
+    model = joined_pendulum()
+    whole, start = start_of(model)
+    cut, _ = divided(model, whole, start)
+    assert moved_share(cut, cut) == 0.0
+    assert moved_share(whole, cut) == moved_share(cut, whole) > fitting.SETTLED
+
+    def stays(program: Program, point: Point, *rest: Any) -> Solution:
+        del rest
+        return Solution(point, program.objective(point), 1, True, "test")
+
+    def same(model: Model, *rest: Any) -> Model:
+        del rest
+        return model
+
+    def solver(*rest: Any) -> Any:
+        del rest
+        return stays
+
+    monkeypatch.setattr(fitting, "may_be_cut", solver)
+    monkeypatch.setattr(fitting, "laid_for", same)
+    monkeypatch.setattr(fitting, "final_solver", solver)
+    end = Fitted(stays(whole, start), whole)
+    _, after = fitting.relaid(model, end, Phases(silent, 1), fitting.CUTS)
+    assert moved_share(after.program, cut) == 0.0
+    monkeypatch.setattr(fitting, "SETTLED", 1.0)
+    _, kept = fitting.relaid(model, end, Phases(silent, 1), fitting.CUTS)
+    assert moved_share(kept.program, whole) == 0.0
 
 
 def test_starts_compete_with_the_same_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
