@@ -16,7 +16,7 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.options import AT, considered
-from friction_ocp.diagnosis.reading import corrections
+from friction_ocp.diagnosis.reading import corrections, with_additions
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import probabilities
 from friction_ocp.diagnosis.worth import samples
@@ -31,6 +31,8 @@ from friction_ocp.quantities import si_unit
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
+MOST_SHAPES = 4
+"""How often an effect may be given a more general shape, at most."""
 
 
 def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) -> dict[str, Any]:
@@ -208,11 +210,19 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     for item in diagnosis.rounds:
         if item.accepted is not None and item.accepted.key == key:
             names |= _own(item.before, item.accepted)
+    names |= _of_all_shapes(diagnosis.base, key)
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values
     names &= set(final)
     return {name: {"value": final[name], "unit": units[name.partition("@")[0]]} for name in sorted(names)}
+
+
+def _of_all_shapes(base: FittedModel, key: Key) -> set[str]:
+    """Return the parameters that an effect adds to a base model in its more general shapes, which no round may tell."""
+    drives = (base.model.problem.drive, with_additions(base, [key] * MOST_SHAPES))
+    known, found = ({leaf.path for leaf in drive_leaves(drive)} for drive in drives)
+    return found - known
 
 
 def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:

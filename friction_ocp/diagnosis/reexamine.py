@@ -61,22 +61,23 @@ def exchanged(
     """
     done, current, benchmark = list(rounds), bench.current, _Benchmark(bench.current)
     wanted = dict[tuple[Key, Key], _Wanted]()
-    for item in done[:-1]:
+    for index, item in enumerate(done[:-1]):
         held = item.accepted
-        if held is not None and accepted.count(held.key) == 1:
+        if held is not None and _is_open(done, index, accepted):
             for rival in _others(item.choice, accepted):
-                wanted[held.key, rival.key] = _Wanted(_swapped(accepted, held, rival), rival.standing.values)
+                keys = _swapped(accepted, held.key, rival.key)
+                wanted[held.key, rival.key] = _Wanted(keys, rival.standing.values)
     known = _fits(bench, run, wanted)
     for index, item in enumerate(done[:-1]):
         held = item.accepted
-        if held is None or accepted.count(held.key) != 1:
+        if held is None or not _is_open(done, index, accepted):
             continue
         seen, tried = set[Key](), list[Rival]()
         others = _others(item.choice, accepted)
         while others:
             rival = others.pop(0)
             seen.add(rival.key)
-            keys = _swapped(accepted, held, rival)
+            keys = _swapped(accepted, held.key, rival.key)
             if current is bench.current and (held.key, rival.key) in known:
                 swapped = known[held.key, rival.key]
             else:
@@ -97,7 +98,7 @@ def exchanged(
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
         if leader is not None:
             current, benchmark = leader.fitted, _Benchmark(leader.fitted)
-            accepted = [leader.key if other == held.key else other for other in accepted]
+            accepted = _swapped(accepted, held.key, leader.key)
     return current, done, accepted
 
 
@@ -114,8 +115,21 @@ def _less(accepted: Sequence[Key], key: Key) -> list[Key]:
     return [other for other in accepted if other != key]
 
 
-def _swapped(accepted: Sequence[Key], held: Rival, rival: Rival) -> list[Key]:
-    return [rival.key if other == held.key else other for other in accepted]
+def _is_open(rounds: Sequence[Round], index: int, accepted: Sequence[Key]) -> bool:
+    """Whether what a round brought is accepted, and the round no more than gave it a more general shape."""
+    held = rounds[index].accepted
+    if held is None or held.key not in accepted:
+        return False
+    earlier = any(item.accepted is not None and item.accepted.key == held.key for item in rounds[:index])
+    return accepted.count(held.key) == 1 or not earlier
+
+
+def _swapped(accepted: Sequence[Key], held: Key, rival: Key) -> list[Key]:
+    """Return additions with one in the place of another; the same effect elsewhere takes its more general shape on."""
+    if rival[0] == held[0]:
+        return [rival if other == held else other for other in accepted]
+    first = accepted.index(held)
+    return [rival if k == first else other for k, other in enumerate(accepted) if k == first or other != held]
 
 
 def _drive(bench: Bench, keys: Sequence[Key]) -> Drive:

@@ -10,6 +10,7 @@ import pytest
 from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, write_case
 from plant import PlantFriction, PlantRipple
 
+from friction_ocp.diagnosis import reexamine
 from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
@@ -74,6 +75,21 @@ def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None
     after = bench.at(current)
     again = exchanged(after, told, kept, LEVEL, rng, HERE)
     assert again[2] == kept and again[0] is after.current
+
+
+def test_a_more_general_shape_goes_with_the_effect_to_another_place(tmp_path: Path) -> None:
+    """The same effect elsewhere has all of its shape; another effect does not take it on."""
+    bench = open_bench(load_problem(write_case(tmp_path, axis(), effects=("cogging", "asymmetry"))), HERE)
+    wave, other = ("cogging", "motor"), ("asymmetry", "motor")
+    added = round_of(bench, [wave])
+    rounds = [added, round_of(bench, [other]), added, round_of(bench, [other])]
+    assert reexamine._is_open(rounds, 0, [wave, other, wave])  # pyright: ignore[reportPrivateUsage]
+    assert not reexamine._is_open(rounds, 2, [wave, other, wave])  # pyright: ignore[reportPrivateUsage]
+    assert not reexamine._is_open(rounds, 0, [other])  # pyright: ignore[reportPrivateUsage]
+    swapped = reexamine._swapped  # pyright: ignore[reportPrivateUsage]
+    assert swapped([wave, other, wave], wave, ("cogging", "arm")) == [("cogging", "arm"), other, ("cogging", "arm")]
+    assert swapped([wave, other, wave], wave, ("torque_ripple", "motor")) == [("torque_ripple", "motor"), other]
+    assert swapped([wave, other], other, ("stribeck", "motor")) == [wave, ("stribeck", "motor")]
 
 
 def test_gravity_that_is_added_does_not_change_over_what_time_runs_are_judged(tmp_path: Path) -> None:
