@@ -26,7 +26,7 @@ from friction_ocp.estimation.quadratic import bounded_step, linear_constraints
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute
 
-SOFTENINGS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
+SOFTENINGS = (0.1, 0.01, 0.001)
 """Roundings over the mean error through which the loss of linearised residuals is minimised, down to the one asked."""
 NEWTON_STEPS = 12
 """Most Newton steps at each of them."""

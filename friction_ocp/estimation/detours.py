@@ -12,7 +12,7 @@ from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gau
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
-from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, limits
+from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, is_same_end, limits
 from friction_ocp.estimation.stages import ROUNDINGS, keeps_the_loss, mean_error
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
@@ -71,14 +71,16 @@ def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         replace(program, loss=Absolute(rounding * size), width=width * model.speed_scale)
         for rounding, width in zip(ROUNDINGS[2:-1], DETOURS, strict=True)
     ]
-    failed = 0
+    failed, known = 0, [list[Solution]() for _ in softer]
     for k in range(tries.most):
         watch = phases.begin(f"hop {k + 1}")
-        point = _hopped(model, program, best, HOPS[k % len(HOPS)], rng)
-        for stage in softer:
-            point = solve(stage, point, COARSE, watch).point
-        end = solve(program, point, tries.tolerances, watch)
-        iterations += end.iterations
+        point: Point | None = _hopped(model, program, best, HOPS[k % len(HOPS)], rng)
+        for stage, ends in zip(softer, known, strict=True):
+            point = _elsewhere(solve(stage, point, COARSE, watch), ends)
+            if point is None:
+                break
+        end = best if point is None else solve(program, point, tries.tolerances, watch)
+        iterations += 0 if point is None else end.iterations
         failed = 0 if end.objective < (1.0 - BETTER) * best.objective else failed + 1
         best = min(best, end, key=lambda solution: solution.objective)
         if failed == tries.patience:
@@ -86,6 +88,14 @@ def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     end = solve(program, best.point, limits(model), phases.begin("best end"))
     best = min(best, end, key=lambda solution: solution.objective)
     return Fitted(replace(best, iterations=iterations + end.iterations), program)
+
+
+def _elsewhere(end: Solution, known: list[Solution]) -> Point | None:
+    """Note where a stage of a restart ends; None where another restart has gone on from there."""
+    if any(is_same_end(end, other) for other in known):
+        return None
+    known.append(end)
+    return end.point
 
 
 def _hopped(model: Model, program: Program, best: Solution, share: float, rng: np.random.Generator) -> Point:

@@ -185,10 +185,15 @@ def _distinct(ends: Sequence[Solution]) -> list[Solution]:
     """Return the ends, best first, without those that are a better one as far as a coarse solution tells."""
     kept: list[Solution] = []
     for end in ends:
-        near = [other for other in kept if end.objective - other.objective <= COARSE.decrease * other.objective]
-        if not any(np.allclose(end.point.theta, other.point.theta, rtol=SAME, atol=0.0) for other in near):
+        if not any(is_same_end(end, other) for other in kept):
             kept.append(end)
     return kept
+
+
+def is_same_end(end: Solution, other: Solution) -> bool:
+    """Whether two ends of one program are the same as far as a coarse solution tells."""
+    near = abs(end.objective - other.objective) <= COARSE.decrease * min(end.objective, other.objective)
+    return near and bool(np.allclose(end.point.theta, other.point.theta, rtol=SAME, atol=0.0))
 
 
 def _never(end: Solution) -> bool:
@@ -220,8 +225,9 @@ def _same_start(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: 
     """
     program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
-    ends = race(program, points, THOROUGH, phases.begin("least squares"), solve_gauss_newton)
-    return _on_grid(program, ends[0])
+    watch = phases.begin("least squares")
+    best = race(program, points, COARSE, watch, solve_gauss_newton)[0]
+    return _on_grid(program, solve_gauss_newton(program, best.point, THOROUGH, watch))
 
 
 def _on_grid(program: Program, end: Solution) -> FloatArray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -57,42 +56,28 @@ def _table(piece: Piece) -> SegmentTable:
     request, into = piece.request, piece.into
     grid, by = request.grid, request.yardstick
     begin, last, index = request.first[:-1], request.first[1:], np.arange(len(request.first) - 1)
-    kept: list[npt.NDArray[np.generic]] = []
-
-    def at_nodes(array: FloatArray | IntArray | None) -> Addresses:
-        """Return where the row of each segment's first node is."""
-        return _rows(array, begin, kept)
-
-    def same(array: FloatArray | None) -> Addresses:
-        return _rows(array, np.zeros_like(begin), kept)
-
-    def own_row(array: FloatArray | None) -> Addresses:
-        return _rows(array, index, kept)
-
     loss = None if by is None else np.array([by.loss.code, by.loss.parameter], dtype=float)
     score = (None, None, None) if into.score is None else (into.score.cost, into.score.gradient, into.score.square)
-    columns = [
-        (last - begin + 1).astype(np.uintp),
-        (index == index[-1]).astype(np.uintp),
-        *map(at_nodes, (grid.dt, grid.substeps, grid.ticks, grid.at_start, grid.at_end, grid.at_node)),
-        *map(same, (np.asarray(request.p, dtype=float), np.asarray(request.width, dtype=float))),
-        own_row(np.asarray(request.x0, dtype=float)),
-        *map(at_nodes, (piece.resets, None if by is None else by.measured)),
-        *map(same, (None if by is None else by.noise, loss)),
-        *map(at_nodes, (piece.course, into.states, into.y if piece.observed else None, into.dy)),
-        *map(own_row, (into.end, None if into.dend is None else into.dend.transpose(0, 2, 1), *score)),
+    measured, noise = (None, None) if by is None else (by.measured, by.noise)
+    nodes, same, own = np.stack((begin, np.zeros_like(begin), index))
+    pointers = [
+        (nodes, (grid.dt, grid.substeps, grid.ticks, grid.at_start, grid.at_end, grid.at_node)),
+        (same, (np.asarray(request.p, dtype=float), np.asarray(request.width, dtype=float))),
+        (own, (np.asarray(request.x0, dtype=float),)),
+        (nodes, (piece.resets, measured)),
+        (same, (noise, loss)),
+        (nodes, (piece.course, into.states, into.y if piece.observed else None, into.dy)),
+        (own, (into.end, None if into.dend is None else into.dend.transpose(0, 2, 1), *score)),
     ]
-    return SegmentTable(np.column_stack(columns), piece.steps, tuple(kept))
-
-
-def _rows(array: FloatArray | IntArray | None, index: IntArray, kept: list[npt.NDArray[np.generic]]) -> Addresses:
-    """Return the addresses of rows of an array in memory order; what is written to must be in that order already."""
-    if array is None:
-        return np.full(index.size, NOTHING, dtype=np.uintp)
-    whole: npt.NDArray[Any] = np.ascontiguousarray(array)
-    kept.append(whole)
-    addresses: IntArray = int(whole.ctypes.data) + index * whole.strides[0]
-    return addresses.astype(np.uintp)
+    at = np.column_stack([rows for rows, arrays in pointers for _ in arrays])
+    # What is written to must be in memory order already: of anything else this makes a copy.
+    whole = [None if array is None else np.ascontiguousarray(array) for _, arrays in pointers for array in arrays]
+    origin = np.array([NOTHING if array is None else array.__array_interface__["data"][0] for array in whole])
+    stride = np.array([0 if array is None else array.strides[0] for array in whole])
+    addresses = (origin + at * stride).astype(np.uintp)
+    sizes = np.column_stack((last - begin + 1, index == index[-1])).astype(np.uintp)
+    kept = tuple(array for array in whole if array is not None)
+    return SegmentTable(np.hstack((sizes, addresses)), piece.steps, kept)
 
 
 def shares(steps: IntArray, lanes: int, count: int) -> list[int]:
