@@ -24,7 +24,7 @@ EXPECTED_PHASES = 16
 MOST_TURNS = 10
 CUTS = 2
 """Turns in which segments are cut where differences grow along what was found; later ones keep them as long as they
-are nearly where they would be cut afresh."""
+are nearly where they would be cut afresh, or would be cut as they were before."""
 SETTLED = 0.01
 """Relative change of the size of a gap, as inertias, stiffnesses and torque noise are found, below which none moves;
 and share of the cuts that may be elsewhere than where they belong."""
@@ -75,6 +75,7 @@ def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple
     Where free runs are fitted there are no gaps, and the noise is only reported. `done` turns were made before.
     """
     asked, joined = model.problem.estimation.estimated_noise, not fits_free_run(model)
+    known = [fitted.program]
     for turn in range(done, MOST_TURNS):
         point = fitted.solution.point
         if joined:
@@ -86,8 +87,9 @@ def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple
         program = reweighed(model, fitted.program)
         if may_be_cut(model, program):
             afresh, there = divided_afresh(model, program, point)
-            if turn < CUTS or moved_share(afresh, program) > SETTLED:
+            if turn < CUTS or all(moved_share(afresh, other) > SETTLED for other in known):
                 program, point = afresh, there
+                known.append(afresh)
         if are_alike(program, fitted.program, SETTLED):
             return model, Fitted(replace(fitted.solution, objective=program.objective(point)), program)
         watch = phases.begin(f"gaps between segments, turn {turn + 1}")

@@ -199,9 +199,10 @@ def _undamped(program: Program, now: _Iterate, tolerances: Tolerances, valley: f
 
 def _dampings(first: float) -> Iterator[float]:
     damping = max(first, UNDAMPED)
-    while damping <= 1.001 * WIDEST:
+    while damping < 0.999 * WIDEST:
         yield damping
         damping *= 100.0
+    yield WIDEST
 
 
 def _remaining(program: Program, now: _Iterate) -> float:

@@ -217,9 +217,14 @@ def _penalty_for_noise(t: FloatArray, y: FloatArray, noise_std: float) -> float:
         residual = float(np.sqrt(np.mean((y - _reinsch(t, y, 10.0**exponent)) ** 2)))
         return float(np.log(max(residual, 1e-300) / noise_std))
 
-    low, high = -4.0, 12.0
+    low, high, step = -4.0, 12.0, 2.0
     if not noise_std > 0.0 or excess(low) >= 0.0:
         return 0.0
-    if excess(high) <= 0.0:
-        return 10.0**high
-    return 10.0 ** float(optimize.brentq(excess, low, high, xtol=1e-5))
+    while low < high and step > 0.1:
+        try:
+            if excess(low + step) > 0.0:
+                return 10.0 ** float(optimize.brentq(excess, low, low + step, xtol=1e-5))
+            low += step
+        except linalg.LinAlgError:  # rounding: a penalty beyond what stamps so close together can bear
+            step *= 0.5
+    return 10.0**low

@@ -138,6 +138,38 @@ def test_cuts_that_are_not_where_they_belong_are_made_anew(monkeypatch: pytest.M
     assert moved_share(kept.program, whole) == 0.0
 
 
+def test_cuts_that_come_and_go_come_to_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the motion with one set of cuts asks for another, and the other way round, none is taken twice."""
+    model = joined_pendulum()
+    whole, start = start_of(model)
+    cut, there = divided(model, whole, start)
+    solved: list[Program] = []
+
+    def turned(model: Model, program: Program, point: Point) -> tuple[Program, Point]:
+        del model, point
+        return (whole, start) if moved_share(program, cut) == 0.0 else (cut, there)
+
+    def stays(program: Program, point: Point, *rest: Any) -> Solution:
+        del rest
+        solved.append(program)
+        return Solution(point, program.objective(point), 1, True, "test")
+
+    def solver(*rest: Any) -> Any:
+        del rest
+        return stays
+
+    def same(model: Model, *rest: Any) -> Model:
+        del rest
+        return model
+
+    monkeypatch.setattr(fitting, "divided_afresh", turned)
+    monkeypatch.setattr(fitting, "may_be_cut", solver)
+    monkeypatch.setattr(fitting, "laid_for", same)
+    monkeypatch.setattr(fitting, "final_solver", solver)
+    fitting.relaid(model, Fitted(stays(whole, start), whole), Phases(silent, 1), fitting.CUTS)
+    assert len(solved) == 2
+
+
 def test_starts_compete_with_the_same_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
     """A start at a small inertia, which would allow wide gaps, has those of the guesses."""
     seen: list[Model] = []

@@ -207,3 +207,13 @@ def test_a_low_pass_is_undone(rng: np.random.Generator, time_constant: float) ->
     holed = without_low_pass(time, shown, time_constant)
     assert np.flatnonzero(~np.isfinite(holed)).tolist() == [N // 2]
     np.testing.assert_allclose(np.delete(holed, [N // 2 - 1, N // 2])[:-1], np.delete(fed, [N // 2 - 1, N // 2])[:-1])
+
+
+def test_stamps_that_come_in_pairs_are_smoothed(rng: np.random.Generator) -> None:
+    """Penalties beyond what stamps so close together can bear are not needed: the noise is found below them."""
+    time = np.arange(0.0, 30.0, 0.01)
+    time[[500, 1500, 2500]] = time[[499, 1499, 2499]] + 1e-6
+    truth = np.sin(0.5 * time)
+    theta, omega, _ = smooth_motion(time, truth + 1e-3 * rng.standard_normal(time.size))
+    assert np.sqrt(np.mean((theta - truth) ** 2)) < 3e-4
+    assert np.sqrt(np.mean((omega - 0.5 * np.cos(0.5 * time))[20:-20] ** 2)) < 5e-3
