@@ -11,6 +11,7 @@ from friction_ocp.problem_file.rules import (
     dissipation,
     excitation,
     foresight,
+    plausibility,
     recordings,
     signals,
     static,
@@ -39,7 +40,8 @@ def check(problem: Problem) -> tuple[Finding, ...]:
 def check_before_fit(problem: Problem) -> tuple[Finding, ...]:
     """Return the same without what a fit finds out itself: what the recordings cannot tell."""
     doubts = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-    return _run(Case(problem), (*MODEL, *doubts), (*WHOLE, *excitation.FIT))
+    named = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY)
+    return _run(Case(problem), (*MODEL, *doubts), named)
 
 
 def check_file(problem: Problem) -> tuple[Finding, ...]:

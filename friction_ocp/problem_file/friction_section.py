@@ -90,6 +90,21 @@ class FrictionSection(Section):
     added: AddedSection | None = None
     bristle: BristleSection | None = None
 
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the numbers of the law, then what every law may have; what only a diagnosis writes is left out."""
+        every = super().keys()
+        known = [name for name in every if name not in ("added", "bristle")]
+        return sorted(known, key=lambda name: name in FrictionSection.model_fields)
+
+    @classmethod
+    def hint(cls, name: str) -> str:
+        """Return the nearest key, else the laws that have this one and all that this law has."""
+        own = set(cls.keys()) - set(FrictionSection.model_fields)
+        wider = {law: {field.name for field in dataclasses.fields(kind)} for law, kind in friction_laws().items()}
+        with_it = [law for law, keys in wider.items() if {name, *own} <= keys]
+        return super().hint(name) or (f"the law {' or '.join(with_it)} has it" if with_it else "")
+
     def build(self, law: type[AbstractFrictionLaw]) -> FrictionElement:
         numbers = given(self, *(name for name in self.keys() if name not in FrictionSection.model_fields))
         whole: AbstractFrictionLaw = law(**{name: _built(value) for name, value in numbers.items()})

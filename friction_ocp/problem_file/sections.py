@@ -81,7 +81,7 @@ def _fault(details: ErrorDetails, section: type[Section] | None) -> Fault:
     number = () if section is not None and section.is_number else None
     if section is not None and details["type"] == "extra_forbidden":
         keys, name = section.keys(), str(location[-1])
-        return Fault(location, f"unknown key '{name}'", f"available: {', '.join(keys)}", closest(name, keys), number)
+        return Fault(location, f"unknown key '{name}'", f"available: {', '.join(keys)}", section.hint(name), number)
     if details["type"] == "missing":
         needed = section is not None and _holds_number(section, str(location[-1]))
         return Fault(
@@ -114,6 +114,11 @@ class Section(BaseModel):
     def keys(cls) -> list[str]:
         """Return the keys that exist here."""
         return [field.alias or name for name, field in cls.model_fields.items()]
+
+    @classmethod
+    def hint(cls, name: str) -> str:
+        """Return what was probably meant by a key that does not exist here."""
+        return closest(name, cls.keys())
 
     @model_validator(mode="wrap")
     @classmethod

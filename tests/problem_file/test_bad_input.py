@@ -71,6 +71,16 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         "channels.current.delay: current is an input, and its delay cannot be fitted; a number; fit the delay of the",
     ),
     "unknown key of a law": (put(f"{FRICTION}/sigma0", 1.0), "drive.shafts[0].friction.sigma0: unknown key 'sigma0'; "),
+    "key that other laws have": (
+        put(FRICTION, {"law": "coulomb", "tau_c": 1, "viscous": 1}),
+        "drive.shafts[0].friction.viscous: unknown key 'viscous'; available: tau_c, law, load, ripple, warm_up; the "
+        "law coulomb_viscous or stribeck or ",
+    ),
+    "signal of the motor on a shaft": (
+        several(put("drive/motor/name", "servo"), put("channels/current/measures", "load.current")),
+        "channels.current.measures: 'load' has no signal 'current'; available: load.theta, load.omega, load.alpha, "
+        "load.drive_torque; did you mean 'servo.current'?",
+    ),
     "unknown law": (
         put(FRICTION, {"law": "lugree", "tau_c": 1}),
         "drive.shafts[0].friction.law: unknown friction law 'lugree'; available: none, coulomb, viscous, ",
@@ -357,6 +367,12 @@ def channel(name: str, change: Callable[[Any], Any], **attributes: str) -> Calla
     return spoil
 
 
+def speed_in_degrees(file: Any) -> None:
+    """Add the speed in degrees per second, said to be in rad/s."""
+    file["/channels/second"] = np.degrees(np.gradient(file["/channels/position"][()], file["/time"][()]))
+    file["/channels/second"].attrs["unit"] = "rad/s"
+
+
 def backwards(time: Any) -> Any:
     return np.where(np.arange(time.size) == 100, time[98], time)
 
@@ -366,6 +382,10 @@ RECORDING_FAULTS: dict[str, tuple[Callable[[Any], None], str]] = {
     "wrong unit": (
         channel("position", lambda y: y, unit="A"),
         "channel 'position' is in A, but load.theta is in rad; a unit that converts to rad",
+    ),
+    "shaft that moves in a line": (
+        channel("position", lambda y: y, unit="m"),
+        "a unit that converts to rad; state `motion: linear` at shaft 'load' if that is how it moves, or correct the",
     ),
     "no unit": (channel("position", lambda y: y, unit=""), "channel 'position' has no unit"),
     "time backwards": (channel("time", backwards), "time is not increasing at sample 100 (0.1960 s after 0.1980 s)"),
@@ -466,6 +486,22 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         several(drop("drive/motor"), drop("channels/current")),
         "there is no motor, and no input prescribes the motion of a shaft",
     ),
+    "noise in another unit": (
+        put("channels/position/noise_std", 0.05),
+        "channels.position.noise_std: stated noise 0.05 rad, but the samples scatter by ",
+    ),
+    "resolution in another unit": (
+        put("channels/position/resolution", 0.05),
+        "channels.position.resolution: stated resolution 0.05 rad, but the samples are on steps of 0.001 rad",
+    ),
+    "two sensors of one shaft in different units": (
+        put("channels/second", {"measures": "load.omega"}),
+        "channels.second: 'second' moves 57.3 times as far as 'position' and the other sensor of this shaft",
+    ),
+    "time in milliseconds": (
+        put("channels/current/hold", "zero"),
+        "sweep.h5: a sample every 2 s; time in s; correct the time axis if it is in ms",
+    ),
     "validated on the training data": (
         put("recordings/validation", ["sweep.h5"]),
         "this file also stands in recordings.tr",
@@ -473,14 +509,22 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
 }
 
 
+DOUBTFUL: dict[str, Callable[[Any], None]] = {
+    "no reversal": channel("position", lambda y: 3.0 * np.arange(y.size) * 0.002 + 0.1 * y),
+    "gravity over a small angle": channel("position", lambda y: 0.1 * y / np.ptp(y)),
+    "noise in another unit": channel("position", lambda y: y + 1e-3 * np.random.default_rng(0).normal(size=y.size)),
+    "resolution in another unit": channel("position", lambda y: 1e-3 * np.round(y / 1e-3)),
+    "two sensors of one shaft in different units": speed_in_degrees,
+    "time in milliseconds": channel("time", lambda t: 1e3 * t),
+}
+"""Recordings that go with the doubtful problems."""
+
+
 @pytest.mark.parametrize("name", WARNINGS)
 def test_doubtful_problem_is_a_warning(workshop: Workshop, name: str) -> None:
     """What is doubtful is said, as a warning, and does not stop anyone."""
     spoil, expected = WARNINGS[name]
-    if name == "no reversal":
-        workshop.recording(spoil=channel("position", lambda y: 3.0 * np.arange(y.size) * 0.002 + 0.1 * y))
-    if name == "gravity over a small angle":
-        workshop.recording(spoil=channel("position", lambda y: 0.1 * y / np.ptp(y)))
+    workshop.recording(spoil=DOUBTFUL.get(name, lambda file: None))
     path = workshop.problem(spoil)
     load_problem(path)
     messages = [message for message in workshop.messages(path) if expected in message]

@@ -181,10 +181,18 @@ class Case:
         for signal in ("omega", "theta"):
             for channel in self.drive.channels:
                 same = channel.signal == signal and joined.group_of.get(channel.part) == joined.group_of[shaft]
-                seen = self._seen(channel, use) if same else None
+                seen = self.seen_by(channel, use) if same else None
                 if seen is not None:
                     return seen.through(float(joined.speed_ratio[shaft] / joined.speed_ratio[channel.part]))
         return None
+
+    def ratio(self, first: str, second: str) -> float | None:
+        """Return the speed of a shaft over that of another, springs as if rigid; None where they are apart."""
+        joined = self._without_springs
+        if first not in joined.group_of or joined.group_of[first] != joined.group_of.get(second):
+            return None
+        found = float(joined.speed_ratio[first] / joined.speed_ratio[second])
+        return found if np.isfinite(found) and found != 0.0 else None
 
     @cached_property
     def _without_springs(self) -> Topology:
@@ -199,7 +207,7 @@ class Case:
         except FrictionOcpError:
             return topology(replace(self.bound, transmissions=()))
 
-    def _seen(self, channel: Channel, use: RecordingUse) -> Motion | None:
+    def seen_by(self, channel: Channel, use: RecordingUse) -> Motion | None:
         """Return the motion that a channel shows at the guesses of its gain and offset."""
         key = (channel.name, id(use))
         if key not in self._motions:

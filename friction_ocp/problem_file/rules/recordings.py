@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.drive.parts import Channel
-from friction_ocp.drive.units import DRIVE_TORQUE, signal_unit
+from friction_ocp.drive.units import DRIVE_TORQUE, SHAFT_SIGNALS, signal_unit
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse, StaticUse
 from friction_ocp.expressions import closest
@@ -16,6 +16,7 @@ from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 from friction_ocp.problem_file.rules.clipping import channels_are_not_clipped
 from friction_ocp.problem_file.rules.power import sign_of_work
 from friction_ocp.problem_file.rules.signals import is_driving
+from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
 from friction_ocp.recording.recording import FloatArray
 
@@ -67,7 +68,19 @@ def units_fit_signals(case: Case) -> Iterator[Finding]:
         if recorded.unit != expected:
             what = f"channel '{channel.name}' is in {recorded.unit}, but {channel.measures} is in {expected}"
             allowed = f"a unit that converts to {expected}"
-            yield Finding(where, what, allowed, "correct the unit in the recording, or measures")
+            remedy = "correct the unit in the recording, or measures"
+            yield Finding(where, what, allowed, _if_moving_otherwise(case, channel, recorded.unit) or remedy)
+
+
+def _if_moving_otherwise(case: Case, channel: Channel, unit: str) -> str:
+    """Return the remedy where a unit is that of a shaft that moves in a line instead of turning, or the reverse."""
+    motion = next((shaft.motion for shaft in case.drive.shafts if shaft.name == channel.part), None)
+    kind = SHAFT_SIGNALS.get(channel.signal)
+    if motion is None or kind is None:
+        return ""
+    other = "rotary" if motion == "linear" else "linear"
+    words = f"state `motion: {other}` at shaft '{channel.part}' if that is how it moves, or correct the unit"
+    return words if unit == si_unit(kind, other) else ""
 
 
 def inputs_move(case: Case) -> Iterator[Finding]:

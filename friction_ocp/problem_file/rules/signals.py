@@ -30,7 +30,10 @@ def channels_measure_what_exists(case: Case) -> Iterator[Finding]:
             continue
         if own:
             what = f"'{channel.part}' has no signal '{channel.signal}'"
-            yield Finding(where, what, f"available: {', '.join(own)}", closest(channel.measures, own))
+            meant = [f"{motor.name}.{channel.signal}" for motor in case.drive.motors if motor.shaft == channel.part]
+            turned = [f"did you mean '{name}'?" for name in meant if name in signals]
+            remedy = turned[0] if turned else closest(channel.measures, own)
+            yield Finding(where, what, f"available: {', '.join(own)}", remedy)
         else:
             allowed = f"parts: {', '.join(parts)}; or temperature"
             yield Finding(where, f"unknown part '{channel.part}'", allowed, closest(channel.part, parts))

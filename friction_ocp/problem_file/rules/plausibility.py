@@ -1,0 +1,121 @@
+"""Rules about numbers that a slip of a unit makes: stated noise, what two sensors say of one motion, time axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from friction_ocp.drive.parts import Channel
+from friction_ocp.errors import Finding
+from friction_ocp.estimation.problem import RecordingUse
+from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
+from friction_ocp.quantities import si_unit
+from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise
+from friction_ocp.recording.recording import FloatArray
+
+_SLIP = 10.0
+"""Factor by which stated noise and what samples scatter differ for other reasons than a unit: slow noise, vibration."""
+_LITTLE = 0.01
+"""Noise over the standard deviation of a signal up to which it is nothing odd, be it filtered out of sight."""
+_RATIO_SLIP = 2.0
+"""Factor between two sensors of one motion that no guess of a ratio is off by."""
+_ALIKE = 0.9
+"""Correlation of speeds from which two sensors see one motion."""
+_SELDOM = 0.5
+"""Sampling interval, s, at which hardly any drive is recorded."""
+
+
+def stated_noise_is_seen(case: Case) -> Iterator[Finding]:
+    """The noise that the file states is that of the samples, give or take; only the slow part of it is not seen."""
+    for channel in case.drive.channels:
+        if channel.noise_std is None:
+            continue
+        records = [recorded for _, other, recorded in case.recorded() if other is channel]
+        seen = [high_frequency_noise(item.time, item.values) for item in records]
+        known = [value for value in seen if np.isfinite(value) and value > 0]
+        steps = [step for item in records if (step := detect_resolution(item.values)) is not None]
+        if not known:
+            continue
+        scatter, unit = float(np.median(known)), records[0].unit
+        largest = max([scatter, *steps])
+        swing = max(float(np.nanstd(item.values)) for item in records)
+        slipped = channel.noise_std > max(_SLIP * largest, _LITTLE * swing)
+        slipped |= channel.signal == "theta" and channel.noise_std < scatter / _SLIP
+        if slipped:
+            stated = quantity_text(channel.noise_std, unit)
+            what = f"stated noise {stated}, but the samples scatter by {scatter:.2g} {unit} about a smooth curve"
+            allowed = f"standard deviation in {unit}, whatever the unit in the file was"
+            where = case.at(f"channels.{channel.name}.noise_std")
+            yield Finding(where, what, allowed, "convert it, or leave it out: it is measured then", "warning")
+
+
+def resolution_is_seen(case: Case) -> Iterator[Finding]:
+    """Values lie on the grid of the resolution that the file states, not on a finer one."""
+    for channel in case.drive.channels:
+        records = [recorded for _, other, recorded in case.recorded() if other is channel]
+        steps = [step for item in records if (step := detect_resolution(item.values)) is not None]
+        if channel.resolution is None or not steps or channel.resolution <= _RATIO_SLIP * min(steps):
+            continue
+        unit = records[0].unit
+        stated = quantity_text(channel.resolution, unit)
+        what = f"stated resolution {stated}, but the samples are on steps of {min(steps):.3g} {unit}"
+        where = case.at(f"channels.{channel.name}.resolution")
+        remedy = "convert it, or leave it out: it is measured then"
+        yield Finding(where, what, f"the step in {unit}", remedy, "warning")
+
+
+def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
+    """What two sensors see of shafts that are joined differs by the stated ratio."""
+    seeing = [channel for channel in case.drive.channels if channel.signal in ("theta", "omega")]
+    for first, second in combinations(seeing, 2):
+        factors = [factor for _, use in case.uses() if (factor := _factor(case, first, second, use)) is not None]
+        if not factors:
+            continue
+        factor = float(np.median(factors))
+        if 1.0 / _RATIO_SLIP <= factor <= _RATIO_SLIP:
+            continue
+        expected = "what the ratios in the file say" if first.part != second.part else "the other sensor of this shaft"
+        what = f"'{second.name}' moves {factor:.3g} times as far as '{first.name}' and {expected}"
+        allowed = "ratio: speed of the first shaft over that of the second, in rad/m where the second moves in a line"
+        remedy = "correct the ratio or its sign, or the unit, scale or sign of one of the two"
+        yield Finding(case.at(f"channels.{second.name}"), what, allowed, remedy, "warning")
+
+
+def _factor(case: Case, first: Channel, second: Channel, use: RecordingUse) -> float | None:
+    """Return the speed that one sensor shows over what another and the ratio say; None where they see no one motion."""
+    motions = [case.seen_by(channel, use) for channel in (first, second)]
+    ratio = case.ratio(first.part, second.part)
+    if motions[0] is None or motions[1] is None or ratio is None:
+        return None
+    expected, shown = motions[0].through(1.0 / ratio), motions[1]
+    known = _at(expected, shown.time)
+    power = float(known @ known), float(shown.omega @ shown.omega)
+    if not min(power) > 0.0:
+        return None
+    product = float(known @ shown.omega)
+    return product / power[0] if abs(product) > _ALIKE * np.sqrt(power[0] * power[1]) else None
+
+
+def _at(motion: Motion, time: FloatArray) -> FloatArray:
+    return np.interp(time, motion.time, motion.omega, left=0.0, right=0.0)
+
+
+def samples_come_often_enough(case: Case) -> Iterator[Finding]:
+    """A time axis in milliseconds, taken for seconds, makes a drive a thousand times slower than it is."""
+    for place, use in case.uses():
+        channels = [item for item in use.recording.channels.values() if item.time.size > 1]
+        intervals = [float(np.median(np.diff(item.time))) for item in channels]
+        if intervals and min(intervals) > _SELDOM:
+            what = f"a sample every {quantity_text(min(intervals), si_unit('time'))}"
+            where = case.at_recording(place, use)
+            yield Finding(where, what, "time in s", "correct the time axis if it is in ms", "warning")
+
+
+PLAUSIBILITY: tuple[Rule, ...] = (
+    stated_noise_is_seen,
+    resolution_is_seen,
+    sensors_of_one_motion_agree,
+    samples_come_often_enough,
+)
