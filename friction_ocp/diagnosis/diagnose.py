@@ -167,6 +167,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     clues, left = clues_of(current), innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     stood, superseded = standing(merged(rounds, checked), accepted)
+    superseded += search.taken_back
     return _in_hindsight(
         Diagnosis(
             problem=problem,

@@ -9,7 +9,9 @@ import numpy as np
 
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.held_out import fitted_without, folds
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
+from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.score import FreeRun, simulate_recordings
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
@@ -48,10 +50,23 @@ class FreeErrors:
 
 
 def free_errors(fitted: FittedModel, held_out: bool) -> FreeErrors:
-    """Simulate validation recordings (`held_out`, where there are any) or training recordings freely."""
+    """Simulate training recordings freely, or `held_out` ones: of validation, or training without a part in the fit."""
     model = fitted.model
-    items = model.validation if held_out and model.validation else model.train
-    runs = simulate_recordings(model, items, fitted.theta)
+    if held_out and not model.validation:
+        return left_out_errors(fitted)
+    return _errors(model, simulate_recordings(model, model.validation if held_out else model.train, fitted.theta))
+
+
+def left_out_errors(fitted: FittedModel) -> FreeErrors:
+    """Simulate training recordings, or pieces of the only one, freely with parameters that they took no part in."""
+    items, runs = fitted.linear.program.experiments, list[FreeRun]()
+    for group in folds(fitted):
+        theta = fitted_without(fitted, group)
+        runs += simulate_recordings(fitted.model, tuple(items[k] for k in group), theta)
+    return _errors(fitted.model, tuple(runs))
+
+
+def _errors(model: Model, runs: tuple[FreeRun, ...]) -> FreeErrors:
     floors = model.noise
     power: list[FloatArray] = []
     count: list[FloatArray] = []

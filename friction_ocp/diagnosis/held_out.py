@@ -35,7 +35,7 @@ def held_out(fitted: FittedModel) -> FloatArray:
     program = fitted.linear.program
     costs: dict[int, FloatArray] = {}
     for group in folds(fitted):
-        theta = _without(fitted, group)
+        theta = fitted_without(fitted, group)
         for k in group:
             item = fitted.linear.recordings[k]
             alone, (wider,) = with_own_noise(_only(program, k), fitted.model, fitted.footing, theta)
@@ -75,7 +75,7 @@ def _step_without(fitted: FittedModel, left: BoolArray) -> tuple[FloatArray, flo
     return step, -float(pull @ step) - 0.5 * float(step @ information @ step)
 
 
-def _without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
+def fitted_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
     """Return the parameters fitted to all recordings but some."""
     rows, program, point = fitted.linear.rows, fitted.linear.program, fitted.linear.point
     others = [k for k in range(len(program.experiments)) if k not in group]

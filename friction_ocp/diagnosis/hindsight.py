@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.select import Choice, Round
 from friction_ocp.diagnosis.worth import Key, samples
@@ -12,6 +14,8 @@ from friction_ocp.diagnosis.worth import Key, samples
 MIMICKED = 0.01
 """Probability that what leaves nothing stands in for something outside the catalogue: it did in 2 of the 191 cases of
 the blind suites of seeds 20261125 to 20261127 where a cause was named and noise was left."""
+ABSCISSAE = 64
+"""At which the loss of normal noise is averaged (Gauss-Hermite quadrature)."""
 
 
 def merged(rounds: Sequence[Round], checked: Sequence[Round]) -> list[Round]:
@@ -47,12 +51,14 @@ def _doubted(item: Round, final: FittedModel, left_over: bool, lost: float) -> R
     left = max(_excess(final), 0.0) if left_over else 0.0
     taken = max(item.before.objective - item.accepted.standing.objective, 0.0)
     share = left / (left + taken) if left > 0.0 else lost
-    return replace(item, choice=_less_sure(item.choice, min(max(share, MIMICKED), 1.0)))
+    return replace(item, choice=_less_sure(item.choice, min(max(share, MIMICKED), 1.0 - MIMICKED)))
 
 
 def _excess(fitted: FittedModel) -> float:
-    """Return the objective beyond that of noise."""
-    return fitted.objective - 0.5 * samples(fitted)
+    """Return the objective beyond that of normal noise."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(ABSCISSAE)
+    each = float(weights @ fitted.footing.loss.cost(nodes) / np.sum(weights))
+    return fitted.objective - each * samples(fitted)
 
 
 def _less_sure(choice: Choice, share: float) -> Choice:

@@ -25,6 +25,8 @@ class Considered:
     only: Mapping[str, frozenset[str] | None]
     """Components by effect; None where all are meant."""
     excluded: frozenset[Key] = frozenset()
+    parts: frozenset[str] | None = None
+    """The parts of the stated drive, None where all parts count: what an effect has added is no place for another."""
 
     @property
     def names(self) -> list[str]:
@@ -50,7 +52,8 @@ class Considered:
     def candidates(self, drive: Drive) -> list[Key]:
         """Return what competes in a drive."""
         found = [(effect.name, place) for effect, place in candidates(drive, self.names)]
-        return [key for key in found if self.holds(*key)]
+        added = frozenset[str]() if self.parts is None else _parts(drive) - self.parts
+        return [key for key in found if self.holds(*key) and key[1] not in added]
 
 
 NONE = Considered({})
@@ -86,7 +89,7 @@ def considered(problem: Problem) -> Considered:
         known = only.get(effect, frozenset[str]())
         only[effect] = None if component is None or known is None else known | {component}
     excluded = ((effect, component) for effect, component in left_out if component is not None)
-    return Considered(only, frozenset(excluded))
+    return Considered(only, frozenset(excluded), _parts(problem.drive))
 
 
 def places(current: FittedModel, meant: Considered) -> list[Key]:
@@ -95,11 +98,15 @@ def places(current: FittedModel, meant: Considered) -> list[Key]:
     found = meant.candidates(drive)
     driven = drive.prescribed
     if current.model.static and driven:
-        found += [key for key in meant.candidates(_released(drive)) if key[1] in driven]
+        found += [key for key in meant.candidates(released(drive)) if key[1] in driven]
     return list(dict.fromkeys(found))
 
 
-def _released(drive: Drive) -> Drive:
+def _parts(drive: Drive) -> frozenset[str]:
+    return frozenset(part.name for part in (*drive.shafts, *drive.transmissions, *drive.motors))
+
+
+def released(drive: Drive) -> Drive:
     """Return a drive whose motion no input prescribes."""
     driven = drive.prescribed
     return replace(
@@ -114,7 +121,7 @@ def _entries(problem: Problem, key: str, stated: object, findings: list[Finding]
         findings.append(Finding(where, f"this is {stated!r}", "a list of effects"))
         return []
     catalogue, found = effects(), list[tuple[str, str | None]]()
-    drives = (problem.drive, _released(problem.drive))
+    drives = (problem.drive, released(problem.drive))
     for entry in map(str, cast(list[Any], stated)):
         effect, at, component = entry.partition(AT)
         if effect not in catalogue:

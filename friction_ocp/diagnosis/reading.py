@@ -11,6 +11,7 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import FLOOR_DOUBT
 from friction_ocp.diagnosis.fitting import FittedModel, freed, polished, timed
 from friction_ocp.diagnosis.footing import training_pieces
+from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects
@@ -81,12 +82,13 @@ def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
     What is named again gets a more general shape.
     Values that were taken back are no part of it: they are fitted in the base model already.
     """
-    drive, clues = base.model.problem.drive, clues_of(base)
+    drive, clues, there = base.model.problem.drive, clues_of(base), set[Key]()
     for effect, place in keys:
         kind = effects()[effect]
-        shape = kind.reshaped(drive, place, clues)
-        if shape is not None:
-            drive = shape.drive
-        elif place in {*kind.places(drive), *drive.prescribed}:
+        if (effect, place) in there:
+            shape = kind.reshaped(drive, place, clues)
+            drive = drive if shape is None else shape.drive
+        elif place in kind.places(drive) or (place in drive.prescribed and place in kind.places(released(drive))):
             drive = kind.augment(drive, place, clues).drive
+            there.add((effect, place))
     return drive

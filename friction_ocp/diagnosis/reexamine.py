@@ -72,12 +72,12 @@ def exchanged(
         held = item.accepted
         if held is None or not _is_open(done, index, accepted):
             continue
-        seen, tried = set[Key](), list[Rival]()
+        seen, tried, made = set[Key](), list[Rival](), {held.key: accepted}
         others = _others(item.choice, accepted)
         while others:
             rival = others.pop(0)
             seen.add(rival.key)
-            keys = _swapped(accepted, held.key, rival.key)
+            keys = made[rival.key] = _swapped(accepted, held.key, rival.key)
             if current is bench.current and (held.key, rival.key) in known:
                 swapped = known[held.key, rival.key]
             else:
@@ -98,7 +98,7 @@ def exchanged(
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
         if leader is not None:
             current, benchmark = leader.fitted, _Benchmark(leader.fitted)
-            accepted = _swapped(accepted, held.key, leader.key)
+            accepted = made[leader.key]
     return current, done, accepted
 
 

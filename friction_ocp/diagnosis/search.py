@@ -11,7 +11,7 @@ from friction_ocp.diagnosis.bench import Bench, Tell, bettered
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, without_addition
-from friction_ocp.diagnosis.free_gap import carries_over, free_errors
+from friction_ocp.diagnosis.free_gap import carries_over, left_out_errors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.reading import with_additions
@@ -59,6 +59,8 @@ class Search:
     tell: Tell
     rounds: list[Round] = field(default_factory=list[Round])
     accepted: list[Key] = field(default_factory=list[Key])
+    taken_back: list[Round] = field(default_factory=list[Round])
+    """Rounds that no longer count, with what they had added."""
     _begun: int = 0
 
     def __post_init__(self) -> None:
@@ -78,6 +80,7 @@ class Search:
                 self._settle()
                 break
         if self.accepted and not self._helps():
+            self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
 
     def _from_better(self) -> Round | None:
@@ -130,7 +133,7 @@ class Search:
             done = self._round(bench, kept, self.meant)
             if done.accepted is not None and done.accepted.standing.cost < current.cost - UNIMPORTANT:
                 self.bench, self.accepted = bench, kept
-                self.rounds.pop(index)
+                self.taken_back.append(self.rounds.pop(index))
                 return done
         return None
 
@@ -164,7 +167,7 @@ class Search:
             self._exchange()
 
     def _helps(self) -> bool:
-        """Whether what was added leaves nothing, or makes free runs better elsewhere.
+        """Whether what was added leaves nothing, or makes free runs of training recordings left out better.
 
         Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
         runs that are lost say nothing.
@@ -172,7 +175,7 @@ class Search:
         base, current = self.bench.base, self.bench.current
         if not innovations(current).significant(self.level):
             return True
-        before, after = (free_errors(fitted, held_out=True) for fitted in (base, current))
+        before, after = map(left_out_errors, (base, current))
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:

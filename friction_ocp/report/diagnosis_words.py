@@ -25,6 +25,10 @@ def diagnosis_sentence(result: Json) -> str:
         case "undecided":
             likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
             return f"There is a gap, and several causes fit it: {likely}."
+        case _ if accepted and not part(result, "remainder").get("carries_over", True):
+            where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
+            doubt = f"not on recordings left out, where {_closed(closed)}"
+            return f"There is a gap beyond the noise; {where}, but {doubt}. The cause is probably another."
         case _ if accepted:
             found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
             left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
@@ -45,14 +49,14 @@ def _with_rivals(result: Json) -> list[str]:
 
 
 def _stand_ins(result: Json) -> str:
-    """Say which accepted effects may stand in for what is not known."""
+    """Say which accepted effects may stand in for what is not known; the doubt of a shape is not that of the effect."""
     doubts = {
         _named(part(item, "accepted")): float(part(item, "probabilities")["outside_catalogue"])
         for item in rows(result, "rounds")
-        if item.get("accepted")
+        if item.get("accepted") and not item.get("reshaped")
     }
     worth = [f"{name} ({whole_percent(chance)})" for name, chance in doubts.items() if chance >= NOTABLE]
-    return f". It may be the cause of what was put down to others, too: {_listed(worth)}" if worth else ""
+    return f". The same unknown cause may lie behind what was taken for {_listed(worth)}" if worth else ""
 
 
 def round_sentence(item: Json) -> str:
@@ -75,10 +79,13 @@ def round_sentence(item: Json) -> str:
 
 def superseded_sentences(result: Json) -> list[str]:
     """Say what was added on the way and taken back."""
-    names = [_named(part(item, "accepted")) for item in rows(result, "superseded")]
+    taken = [_named(part(item, "accepted")) for item in rows(result, "superseded") if not item.get("reshaped")]
+    kept = [_named(item) for item in rows(result, "accepted")]
+    names = [name for name in dict.fromkeys(taken) if name not in kept]
     if not names:
         return []
-    return [f"Added on the way and taken back, because what was found later makes it superfluous: {_listed(names)}."]
+    why = "what was found later explains the same" if kept else "nothing came nearer to the recordings left out"
+    return [f"Added on the way and taken back, because {why}: {_listed(names)}."]
 
 
 def alias_sentences(result: Json) -> list[str]:

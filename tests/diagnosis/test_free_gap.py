@@ -45,3 +45,13 @@ def errors_of(power: float, seed: int) -> FreeErrors:
 def test_only_what_comes_closer_elsewhere_carries_over(before: float, after: float, carries: bool) -> None:
     """Not what leaves free runs as far off as they were or farther; where noise is left there is nothing to close."""
     assert carries_over(errors_of(before, 1), errors_of(after, 2), 0) is carries
+
+
+def test_recordings_left_out_are_simulated_with_parameters_of_the_others(tmp_path: Path) -> None:
+    """Without validation recordings the gap is that of folds left out: every sample of training, once."""
+    problem = load_problem(write_case(tmp_path, axis()))
+    base = fit_base(prepare(replace(problem, validation=())))
+    left_out, fitted = free_errors(base, held_out=True), free_errors(base, held_out=False)
+    assert [run.name for run in left_out.runs] == [run.name for run in fitted.runs]
+    assert np.sum(left_out.count) == np.sum(fitted.count)
+    assert np.sum(left_out.power) > np.sum(fitted.power)

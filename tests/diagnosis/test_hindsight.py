@@ -12,15 +12,17 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.hindsight import MIMICKED, doubted, merged, standing
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import NOTHING, Choice, Round
+from friction_ocp.simulation.losses import Absolute, AbstractLoss, Squares
 
 SAMPLES = 1000
 NOISE = 0.5 * SAMPLES
 
 
-def fitted(objective: float) -> FittedModel:
-    """Return what ends at an objective; that of noise is `NOISE`."""
+def fitted(objective: float, loss: AbstractLoss = Squares()) -> FittedModel:
+    """Return what ends at an objective; that of noise is `NOISE`, unless another loss counts."""
     rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
-    return cast(FittedModel, SimpleNamespace(objective=objective, linear=SimpleNamespace(rows=rows)))
+    linear, footing = SimpleNamespace(rows=rows), SimpleNamespace(loss=loss)
+    return cast(FittedModel, SimpleNamespace(objective=objective, linear=linear, footing=footing))
 
 
 def decided(effect: str | None, before: float, after: float = 0.0, screened: tuple[Any, ...] = ()) -> Round:
@@ -67,3 +69,17 @@ def test_that_nothing_is_missing_does_not_stand_beside_a_wrong_stated_value() ->
     assert merged([found], []) == [found]
     other = decided("cogging", 900.0)
     assert merged([other], [checked]) == [other, checked]
+
+
+def test_no_addition_is_given_up_altogether() -> None:
+    """What closes nothing elsewhere was still found where the model was fitted."""
+    item = doubted([decided("cogging", NOISE + 400.0, NOISE)], fitted(NOISE), False, 1.0)[0]
+    assert item.choice.probabilities[0] == pytest.approx(0.9 * MIMICKED)
+
+
+def test_noise_costs_what_its_loss_makes_of_it() -> None:
+    """Under the absolute loss noise alone is more than half a unit a sample, and yet nothing that is left."""
+    each = float(np.sqrt(2.0 / np.pi))
+    ended = fitted(each * SAMPLES, Absolute(1e-6))
+    item = doubted([decided("cogging", each * SAMPLES + 400.0, each * SAMPLES)], ended, True, 0.0)[0]
+    assert item.choice.nothing == pytest.approx(0.04 + 0.96 * MIMICKED, abs=0.02)

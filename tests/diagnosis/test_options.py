@@ -11,6 +11,7 @@ from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.fitting import fit_base
 from friction_ocp.diagnosis.options import considered, level_of, places
+from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare
@@ -65,3 +66,22 @@ def test_a_level_is_a_probability(problem: Problem, level: object) -> None:
     """Nothing else is taken."""
     with pytest.raises(FrictionOcpError, match=r"between 0 and 0\.5"):
         level_of(_said(problem, {"significance": level}))
+
+
+def test_parts_that_an_effect_added_are_no_place_for_another(problem: Problem) -> None:
+    """A structural mode brings a shaft of its own; what is named is a part of the drive that the file states."""
+    mode = effects()["structural_mode"]
+    drive = with_additions(fit_base(prepare(problem)), [("structural_mode", "motor")])
+    assert len(drive.shafts) == len(problem.drive.shafts) + 1
+    stated = {part.name for part in (*problem.drive.shafts, *problem.drive.motors)}
+    assert {place for effect, place in considered(problem).candidates(drive) if effect == mode.name} <= stated
+    everywhere = {place for _, place in considered(problem).candidates(drive)}
+    assert everywhere <= {*stated, *(item.name for item in problem.drive.channels), "drive"}
+
+
+def test_an_addition_is_made_once_and_only_where_there_is_a_place(problem: Problem) -> None:
+    """Named again it has no more general shape to take; at a shaft that is not there it is left out."""
+    base = fit_base(prepare(problem))
+    once = with_additions(base, [("inertia_error", "motor"), ("structural_mode", "motor")])
+    again = with_additions(base, [("structural_mode", "motor"), ("periodic_disturbance", "nowhere")] * 4)
+    assert len(again.shafts) == len(once.shafts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from friction_ocp.report.diagnosis_words import blind_spot_sentences, diagnosis_sentence
+from friction_ocp.report.diagnosis_words import blind_spot_sentences, diagnosis_sentence, superseded_sentences
 
 LOAD = {"effect": "load_dependence", "component": "servo"}
 COGGING = {"effect": "cogging", "component": "servo"}
@@ -41,3 +41,40 @@ def test_what_recordings_are_too_fast_for_is_told_with_the_speed_to_record() -> 
     (said,) = blind_spot_sentences(result("no_gap", cannot_tell=[spot]))
     assert said.startswith("stribeck at motor: these recordings cannot tell")
     assert said.endswith("0.11 N m of it would stay in the noise. Record below 2.6 rad/s.")
+
+
+def decided(accepted: dict[str, str], outside: float, reshaped: bool = False) -> dict[str, Any]:
+    return {
+        "accepted": accepted,
+        "reshaped": reshaped,
+        "probabilities": {"no_effect": 0.0, "outside_catalogue": outside},
+    }
+
+
+def test_the_doubt_of_a_shape_is_not_that_of_the_effect() -> None:
+    """What may stand in for something unknown is told with the doubt of the round that brought it."""
+    rounds = [decided(COGGING, 0.2), decided(COGGING, 0.91, reshaped=True)]
+    said = diagnosis_sentence(result("unknown_effect", accepted=[COGGING], rounds=rounds))
+    assert said.endswith("The same unknown cause may lie behind what was taken for cogging at servo (20 %).")
+
+
+def test_what_does_not_carry_over_is_no_part() -> None:
+    """An addition that helps nowhere but where it was fitted is told as such, and no rest that there may not be."""
+    gap = {"shrink": {"overall": -0.1, "interval95": [-0.2, -0.05]}}
+    said = diagnosis_sentence(result("unknown_effect", gap=gap, remainder={"significant": True, "carries_over": False}))
+    assert "explains part of it where the model was fitted, but not on recordings left out" in said
+    assert said.endswith("The cause is probably another.")
+    assert "what is left" not in said
+
+
+def test_additions_that_were_taken_back_are_told_once_with_the_reason() -> None:
+    """Not with their shapes, nor what is there again in the end."""
+    rounds = [decided(COGGING, 0.1), decided(COGGING, 0.1, reshaped=True), decided(LAG, 0.1), decided(LOAD, 0.1)]
+    assert superseded_sentences(result("explained", superseded=rounds)) == [
+        "Added on the way and taken back, because what was found later explains the same: cogging at servo and drive "
+        "lag at servo."
+    ]
+    alone = superseded_sentences(result("unknown_effect", accepted=[], superseded=[decided(LAG, 0.1)]))
+    assert alone == [
+        "Added on the way and taken back, because nothing came nearer to the recordings left out: drive lag at servo."
+    ]
