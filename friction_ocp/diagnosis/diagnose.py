@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.options import Considered, considered, level_of
 from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
-from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
+from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.worth import Key, innovations
 from friction_ocp.estimation.problem import Problem
@@ -66,8 +66,8 @@ class Diagnosis:
         Where nothing was added a slow torque of any shape tells; after an addition the power of the innovations alone,
         because a law of slightly another shape leaves a slow torque too.
         """
-        slow = any(item.p_value * len(self.slow) < self.level for item in self.slow)
-        return self.remainder.significant(self.level) or (slow and not self.accepted)
+        slow = not self.accepted and significant(self.slow, self.level)
+        return self.remainder.significant(self.level) or slow
 
     @cached_property
     def closed(self) -> Shrink:

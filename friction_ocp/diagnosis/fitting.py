@@ -50,6 +50,8 @@ UNIMPORTANT = 1.0
 """Difference of the objective that is not worth a step; half a unit is a standard error."""
 NEGLIGIBLE = 0.05
 """The same for one of several steps of the nodes."""
+MARGINAL = 1e-3
+"""Share of what noise does not explain that is not worth going on for."""
 
 
 @dataclass(frozen=True)
@@ -217,10 +219,15 @@ def joined(program: Program, point: Point) -> Point:
     for _ in range(MOST_TURNS):
         trial = solve_nodes(program, carried_on(program, point), STEPS_OF_NODES, NEGLIGIBLE)
         after = program.objective(trial)
-        if not after < cost - UNIMPORTANT:
+        if not after < cost - worthwhile(program, cost):
             break
         point, cost = trial, after
     return point
+
+
+def worthwhile(program: Program, cost: float) -> float:
+    """Return the decrease of a cost that is worth going on for: more than chance, and a share of what is left."""
+    return max(UNIMPORTANT, MARGINAL * (cost - 0.5 * program.samples)) if np.isfinite(cost) else UNIMPORTANT
 
 
 def timed(fitted: FittedModel, limits: Tolerances = WARM) -> FittedModel:
@@ -314,12 +321,14 @@ def freed(fitted: FittedModel) -> FittedModel:
 def unstuck(model: Model, program: Program, point: Point) -> Point:
     """Return where fresh nodes, or those that friction with a hardly smoothed sign leads to, lead on to in turn."""
     ways: list[Callable[[Program, Point], Point]] = [_fresh, *(partial(_rounded, model, width) for width in HARDLY)]
-    idle = 0
+    idle, cost = 0, program.objective(point)
     for turn in range(MOST_TURNS * len(ways)):
         moved = _with_better(program, point, ways[turn % len(ways)](program, point))
-        idle = idle + 1 if moved is point else 1
+        enough, before = worthwhile(program, cost), cost
         if moved is not point:
             point = solve_gauss_newton(program, moved, WARM).point
+            cost = program.objective(point)
+        idle = idle + 1 if before - cost < enough else 1
         if idle == len(ways):
             break
     return point

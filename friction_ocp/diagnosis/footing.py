@@ -156,11 +156,15 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
 
 
 def _torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float]) -> float | None:
-    """Return the torque of a motor per unit of an input channel; None where the channel does not drive it."""
+    """Return the torque of a motor per unit that an input channel shows; None where the channel does not drive it.
+
+    What a channel with a gain shows is that much more than what drives the motor.
+    """
     constant = numbers.get(f"{motor.name}.torque_constant", 1.0)
     factors = {"torque": 1.0, "current": constant, "current_command": constant}
     factors["voltage"] = constant / max(numbers.get(f"{motor.name}.resistance", 1.0), 1e-300)
-    return factors.get(channel.signal) if channel.part == motor.name else None
+    factor = factors.get(channel.signal) if channel.part == motor.name else None
+    return None if factor is None else factor / (numbers.get(f"{channel.name}.gain", 1.0) or 1.0)
 
 
 def _input_noise(model: Model, channel: Channel) -> tuple[float, float]:

@@ -7,7 +7,7 @@ makes of them, and with that of the other places.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +66,11 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
         return ()
     stays = _stays(fitted)
     return tuple(slow_torque_of(fitted, probe, stays) for probe in probes(fitted, clues))
+
+
+def significant(found: Sequence[SlowTorque], level: float) -> bool:
+    """Whether there is a slow torque or error somewhere, at a level that is shared among the places (Bonferroni)."""
+    return any(item.p_value * len(found) < level for item in found)
 
 
 def probes(fitted: FittedModel, clues: Clues) -> Iterator[Probe]:

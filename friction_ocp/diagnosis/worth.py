@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
-from friction_ocp.diagnosis.excess import Excess, excess
+from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors
+from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.effects.effect import Clues
@@ -54,10 +54,14 @@ def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
     return [item for item in found if item.effect in named and item.gain >= worth][:REFITTED]
 
 
-def with_resembling(chosen: Sequence[Screened], found: Sequence[Screened]) -> list[Screened]:
-    """Return candidates with those that resemble them, whatever these promise, as far as their starts go."""
+def with_resembling(chosen: Sequence[Screened], found: Sequence[Screened], astray: bool = False) -> list[Screened]:
+    """Return candidates with those that resemble them, whatever these promise, as far as their starts go.
+
+    Where the model is far `astray` predictions say little about places: what is chosen at one is tried at the others.
+    """
     catalogue, keys = effects(), {item.key for item in chosen}
     alike = {name for item in chosen for name in catalogue[item.effect].resembles}
+    alike |= {item.effect for item in chosen} if astray else set()
     return [*chosen, *(item for item in found if item.effect in alike and item.key not in keys and item.starts)]
 
 
@@ -98,7 +102,8 @@ class Standard:
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
-        get worse, contradict them: what helps from sample to sample alone is not what moves the machine.
+        get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
+        of them is left, they have to get worse for certain: runs that drift may do so by chance.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
@@ -106,6 +111,8 @@ class Standard:
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if before.lost:
             told = most or after.excess() <= before.excess()
+        elif one_step[1] <= (1.0 + FLOOR_DOUBT) ** 2 - 1.0:
+            told = most and shrink(before, after, fitted.model.problem.estimation.seed).interval95[1] >= 0.0
         else:
             told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()
         if told:

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
+from friction_ocp.diagnosis.footing import torque_noise
 from friction_ocp.diagnosis.gathered_noise import unit_covariances
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.problem_file.load import load_problem
@@ -49,3 +50,11 @@ def test_where_it_slides_only_drag_does(span: float, bristled: Model) -> None:
     found, rate = covariance(bristled, span, omega, 1.5 * COULOMB / STIFFNESS), VISCOUS / INERTIA
     assert found[1, 1] == pytest.approx((1.0 - np.exp(-2.0 * rate * span)) / (2.0 * rate), rel=0.02)
     assert found[2, 2] < 1e-3 * found[0, 0] + 1e-12
+
+
+def test_noise_of_a_channel_with_a_gain_is_that_of_the_motor_over_it(bristled: Model) -> None:
+    """A gain of the current and a torque constant are traded for one another, noise included."""
+    known = {"motor.torque_constant": 0.3}
+    plain, shown = (torque_noise(bristled, known | gain)["motor"] for gain in ({}, {"current.gain": 0.5}))
+    assert shown == pytest.approx(2.0 * plain)
+    assert shown == pytest.approx(torque_noise(bristled, {"motor.torque_constant": 0.6})["motor"])

@@ -11,7 +11,7 @@ from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
 
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import fit_base
-from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, slow_torque_of, slow_torques
+from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, significant, slow_torque_of, slow_torques
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -62,3 +62,10 @@ def test_gusts_are_seen(tmp_path: Path) -> None:
     one = found(path)
     assert one.p_value < 1e-6
     assert one.ratio > 2.0
+
+
+def test_the_level_is_shared_among_the_places() -> None:
+    """One of five places that is as odd as one in a hundred is by chance is no gap."""
+    others = [SlowTorque(f"place{k}", 1.0, 0.5) for k in range(4)]
+    assert not significant([SlowTorque("motor", 1.5, 0.005), *others], 0.01)
+    assert significant([SlowTorque("motor", 3.0, 0.001), *others], 0.01)

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
+from friction_ocp.diagnosis import worth
+from friction_ocp.diagnosis.excess import Excess
+from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors
+from friction_ocp.diagnosis.screen import Screened, Start
+from friction_ocp.diagnosis.worth import Standard, with_resembling
+from friction_ocp.effects.effect import Augmentation, Trial
 from friction_ocp.estimation.score import FreeRun
 
 FLOOR = 0.01
@@ -19,3 +28,44 @@ def test_a_run_is_lost_where_the_mean_would_be_nearer(error: float, lost: bool) 
     run = FreeRun("a", time, measured, measured + error, np.zeros((400, 2)), {})
     power, count = np.array([[400.0 * (error / FLOOR) ** 2]]), np.array([[400.0]])
     assert FreeErrors((run,), ("position",), np.array([FLOOR]), power, count).lost is lost
+
+
+def seen(effect: str, component: str, gain: float) -> Screened:
+    """Return a candidate as a score test sees it, with one start."""
+    start = Start(Trial(({"x": 1.0},)), (1.0,), {})
+    return Screened(effect, component, gain, 0.5, (start,), cast(Augmentation, SimpleNamespace(off={})))
+
+
+def test_far_from_the_recordings_an_effect_is_tried_at_all_its_places() -> None:
+    """There predictions say little about the place; nearer they decide."""
+    found = [seen("cogging", "motor", 100.0), seen("asymmetry", "motor", 50.0), seen("asymmetry", "load", 0.1)]
+    assert with_resembling(found[:2], found) == found[:2]
+    assert with_resembling(found[:2], found, astray=True) == found
+
+
+def drifting(power: float, beyond: float, seed: int) -> FittedModel:
+    """Return a fit whose free runs drift, unevenly, and whose one-step predictions leave something beyond noise."""
+    blocks = 100.0 * power * np.random.default_rng(seed).chisquare(1.0, (24, 1))
+    run = FreeRun("a", np.arange(2.0), np.array([[-1e6], [1e6]]), np.zeros((2, 1)), np.zeros((2, 1)), {})
+    free = FreeErrors((run,), ("position",), np.ones(1), blocks, np.full((24, 1), 100.0))
+    model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
+    linear = SimpleNamespace(rows=SimpleNamespace(recording=np.zeros(1), static=()))
+    return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear))
+
+
+@pytest.mark.parametrize(("left", "after", "material"), [(0.0, 6.0, True), (0.3, 6.0, False), (0.0, 500.0, False)])
+def test_free_runs_that_drift_may_get_worse_by_chance(
+    left: float, after: float, material: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing is left from sample to sample, an addition counts unless free runs get worse for certain."""
+
+    def free_errors(fitted: SimpleNamespace, held_out: bool) -> FreeErrors:
+        assert not held_out
+        return fitted.free
+
+    def innovations(fitted: SimpleNamespace) -> Excess:
+        return Excess(1.0 + fitted.beyond, 0.5)
+
+    monkeypatch.setattr(worth, "free_errors", free_errors)
+    monkeypatch.setattr(worth, "innovations", innovations)
+    assert Standard(drifting(5.0, 0.7, 1)).is_material(drifting(after, left, 2)) is material
