@@ -19,6 +19,8 @@ _SLIP = 10.0
 """Factor by which stated noise and what samples scatter differ for other reasons than a unit: slow noise, vibration."""
 _LITTLE = 0.01
 """Noise over the standard deviation of a signal up to which it is nothing odd, be it filtered out of sight."""
+_NONE = 1e-6
+"""Scatter over stated noise below which the samples carry no noise at all; no unit is off by as much."""
 _RATIO_SLIP = 2.0
 """Factor between two sensors of one motion that no guess of a ratio is off by."""
 _ALIKE = 0.9
@@ -34,7 +36,7 @@ def stated_noise_is_seen(case: Case) -> Iterator[Finding]:
             continue
         records = [recorded for _, other, recorded in case.recorded() if other is channel]
         seen = [high_frequency_noise(item.time, item.values) for item in records]
-        known = [value for value in seen if np.isfinite(value) and value > 0]
+        known = [value for value in seen if np.isfinite(value) and value > _NONE * channel.noise_std]
         steps = [step for item in records if (step := detect_resolution(item.values)) is not None]
         if not known:
             continue
