@@ -22,6 +22,7 @@ from friction_ocp.diagnosis.fitting import (
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues
@@ -121,6 +122,11 @@ class Bench:
     def clues(self) -> Clues:
         """What the current model says about sizes."""
         return clues_of(self.current)
+
+    @cached_property
+    def slow(self) -> tuple[SlowTorque, ...]:
+        """Slow torques and errors that the current model lacks."""
+        return slow_torques(self.current, self.clues)
 
     @cached_property
     def standard(self) -> Standard:

@@ -9,9 +9,8 @@ from functools import cached_property
 
 from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
-from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.crew import screen_candidate
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess
+from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
@@ -19,7 +18,7 @@ from friction_ocp.diagnosis.options import Considered, considered, level_of
 from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
-from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
+from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.worth import Key, innovations
 from friction_ocp.estimation.problem import Problem
@@ -164,7 +163,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         search.go()
     rounds, accepted = search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)
-    clues, left = clues_of(current), innovations(current)
+    ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     stood, superseded = standing(merged(rounds, checked), accepted)
     superseded += search.taken_back
@@ -180,8 +179,8 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             before=free_errors(base, held_out=True),
             after=free_errors(current, held_out=True),
             remainder=left,
-            slow=slow_torques(current, clues),
-            blind=blind_spots(current, left, clues, meant),
+            slow=ended.slow,
+            blind=blind_spots(current, left, ended.clues, meant),
             seconds=time.perf_counter() - began,
         )
     )
@@ -203,7 +202,7 @@ def _checked(current: FittedModel, meant: Considered, level: float) -> tuple[Fit
     rounds = list[Round]()
     for _ in range(MOST_PARTS):
         power = innovations(current)
-        noise = not power.significant(level) and power.ratio <= (1.0 + FLOOR_DOUBT) ** 2
+        noise = not power.significant(level) and power.ratio <= DOUBTED
         found = contradictions(current) if noise else []
         if not found:
             break

@@ -11,6 +11,8 @@ from friction_ocp.diagnosis.linear import Rows
 
 FLOOR_DOUBT = 0.05
 """Relative doubt about any noise floor: an error that is this much above it may be the floor's own."""
+DOUBTED = (1.0 + FLOOR_DOUBT) ** 2
+"""Power over that of noise up to which it may be the floor's own."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,10 @@ def excess(rows: Rows, blocks: Blocks) -> Excess:
     if ratios.size < 2:
         return Excess(mean, 1.0)
     spread = float(np.std(ratios, ddof=1)) / np.sqrt(ratios.size)
-    limit = (1.0 + FLOOR_DOUBT) ** 2
-    statistic = (float(np.mean(ratios)) - limit) / max(spread, 1e-300)
-    rare = float(stats.chi2.sf(float(np.sum(ratios)) / limit, ratios.size))
+    statistic = (float(np.mean(ratios)) - DOUBTED) / max(spread, 1e-300)
+    rare = float(stats.chi2.sf(float(np.sum(ratios)) / DOUBTED, ratios.size))
     tests = [float(stats.t.sf(statistic, ratios.size - 1)), rare]
     for number in rows.static:
         errors = rows.residual[rows.recording == number]
-        tests.append(float(stats.chi2.sf(float(errors @ errors) / limit, errors.size)))
+        tests.append(float(stats.chi2.sf(float(errors @ errors) / DOUBTED, errors.size)))
     return Excess(mean, min(1.0, len(tests) * min(tests)))

@@ -326,8 +326,8 @@ def unstuck(model: Model, program: Program, point: Point) -> Point:
         moved = _with_better(program, point, ways[turn % len(ways)](program, point))
         enough, before = worthwhile(program, cost), cost
         if moved is not point:
-            point = solve_gauss_newton(program, moved, WARM).point
-            cost = program.objective(point)
+            end = solve_gauss_newton(program, moved, WARM)
+            point, cost = end.point, end.objective
         idle = idle + 1 if before - cost < enough else 1
         if idle == len(ways):
             break

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT
+from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.held_out import fitted_without, folds
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
@@ -101,7 +101,7 @@ def shrink(before: FreeErrors, after: FreeErrors, seed: int) -> Shrink:
 
 def carries_over(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
     """Whether free runs come closer than before, at 95 %, or leave nothing but noise whose size is in doubt."""
-    return after.excess() <= (1.0 + FLOOR_DOUBT) ** 2 - 1.0 or shrink(before, after, seed).interval95[0] > 0.0
+    return after.excess() <= DOUBTED - 1.0 or shrink(before, after, seed).interval95[0] > 0.0
 
 
 def _share(before: float, after: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT
+from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitting import FittedModel, freed, polished, timed
 from friction_ocp.diagnosis.footing import training_pieces
 from friction_ocp.diagnosis.options import released
@@ -58,7 +58,7 @@ def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key]
     """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest."""
     left = innovations(final)
     fewer = [[other for other in accepted if other != key] for key in accepted]
-    if any(_ratio_with(base, keys, final) <= left.ratio * (1.0 + FLOOR_DOUBT) ** 2 for keys in fewer):
+    if any(_ratio_with(base, keys, final) <= left.ratio * DOUBTED for keys in fewer):
         return True
     return left_over and _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond
 

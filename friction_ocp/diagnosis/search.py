@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
-from friction_ocp.diagnosis.slow_torque import significant, slow_torques
+from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.worth import (
     Key,
     gain,
@@ -194,7 +194,7 @@ class Search:
         found = crew.screened(keys)
         power = excess(current.linear.rows, blocks)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
-        gap = power.significant(level) or (not accepted and significant(slow_torques(current, bench.clues), level))
+        gap = power.significant(level) or (not accepted and significant(bench.slow, level))
         chosen = with_resembling(
             shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found, current.astray
         )

@@ -14,7 +14,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT
+from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, KinematicError, Shaft
 from friction_ocp.effects.effect import (
@@ -175,8 +175,7 @@ def _tested(place: str, fitted: FittedModel, columns: FloatArray, stays: IntArra
         return SlowTorque(place, 1.0, 1.0)
     amplitudes = axes[:, told].T @ (columns.T @ rows.residual) / np.sqrt(powers[told])
     ratio = float(np.mean(amplitudes**2))
-    limit = (1.0 + FLOOR_DOUBT) ** 2
-    return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / limit, freedom)))
+    return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom)))
 
 
 def _shared(columns: FloatArray, stays: IntArray) -> FloatArray:

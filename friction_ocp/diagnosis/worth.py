@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
-from friction_ocp.diagnosis.excess import FLOOR_DOUBT, Excess, excess
+from friction_ocp.diagnosis.excess import DOUBTED, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
@@ -111,7 +111,7 @@ class Standard:
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if before.lost:
             told = most or after.excess() <= before.excess()
-        elif one_step[1] <= (1.0 + FLOOR_DOUBT) ** 2 - 1.0:
+        elif one_step[1] <= DOUBTED - 1.0:
             told = most and shrink(before, after, fitted.model.problem.estimation.seed).interval95[1] >= 0.0
         else:
             told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()

@@ -107,16 +107,13 @@ def test_cuts_are_made_afresh_along_the_motion_at_hand() -> None:
     assert moved.nodes[0] == pytest.approx(point.nodes[0][after.segments[0].first[:-1]])
 
 
-def test_cuts_that_are_not_where_they_belong_are_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Behind the turns that always cut, too; those that are nearly there are kept."""
-    model = joined_pendulum()
-    whole, start = start_of(model)
-    cut, _ = divided(model, whole, start)
-    assert moved_share(cut, cut) == 0.0
-    assert moved_share(whole, cut) == moved_share(cut, whole) > fitting.SETTLED
+def stand_still(monkeypatch: pytest.MonkeyPatch) -> list[Program]:
+    """Let solvers stay where they begin, and gaps as they are; return the list of what is solved."""
+    solved: list[Program] = []
 
     def stays(program: Program, point: Point, *rest: Any) -> Solution:
         del rest
+        solved.append(program)
         return Solution(point, program.objective(point), 1, True, "test")
 
     def same(model: Model, *rest: Any) -> Model:
@@ -130,7 +127,19 @@ def test_cuts_that_are_not_where_they_belong_are_made_anew(monkeypatch: pytest.M
     monkeypatch.setattr(fitting, "may_be_cut", solver)
     monkeypatch.setattr(fitting, "laid_for", same)
     monkeypatch.setattr(fitting, "final_solver", solver)
-    end = Fitted(stays(whole, start), whole)
+    return solved
+
+
+def test_cuts_that_are_not_where_they_belong_are_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind the turns that always cut, too; those that are nearly there are kept."""
+    model = joined_pendulum()
+    whole, start = start_of(model)
+    cut, _ = divided(model, whole, start)
+    assert moved_share(cut, cut) == 0.0
+    assert moved_share(whole, cut) == moved_share(cut, whole) > fitting.SETTLED
+
+    stand_still(monkeypatch)
+    end = Fitted(Solution(start, whole.objective(start), 1, True, "test"), whole)
     _, after = fitting.relaid(model, end, Phases(silent, 1), fitting.CUTS)
     assert moved_share(after.program, cut) == 0.0
     monkeypatch.setattr(fitting, "SETTLED", 1.0)
@@ -143,30 +152,16 @@ def test_cuts_that_come_and_go_come_to_rest(monkeypatch: pytest.MonkeyPatch) -> 
     model = joined_pendulum()
     whole, start = start_of(model)
     cut, there = divided(model, whole, start)
-    solved: list[Program] = []
+    solved = stand_still(monkeypatch)
 
     def turned(model: Model, program: Program, point: Point) -> tuple[Program, Point]:
         del model, point
         return (whole, start) if moved_share(program, cut) == 0.0 else (cut, there)
 
-    def stays(program: Program, point: Point, *rest: Any) -> Solution:
-        del rest
-        solved.append(program)
-        return Solution(point, program.objective(point), 1, True, "test")
-
-    def solver(*rest: Any) -> Any:
-        del rest
-        return stays
-
-    def same(model: Model, *rest: Any) -> Model:
-        del rest
-        return model
-
     monkeypatch.setattr(fitting, "divided_afresh", turned)
-    monkeypatch.setattr(fitting, "may_be_cut", solver)
-    monkeypatch.setattr(fitting, "laid_for", same)
-    monkeypatch.setattr(fitting, "final_solver", solver)
-    fitting.relaid(model, Fitted(stays(whole, start), whole), Phases(silent, 1), fitting.CUTS)
+    phases = Phases(silent, 1)
+    first = fitting.final_solver(model)(whole, start, fitting.limits(model), phases.begin("before"))
+    fitting.relaid(model, Fitted(first, whole), phases, fitting.CUTS)
     assert len(solved) == 2
 
 

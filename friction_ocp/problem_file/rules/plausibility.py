@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +13,7 @@ from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise
+from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
 
 _SLIP = 10.0
@@ -34,14 +35,13 @@ def stated_noise_is_seen(case: Case) -> Iterator[Finding]:
     for channel in case.drive.channels:
         if channel.noise_std is None:
             continue
-        records = [recorded for _, other, recorded in case.recorded() if other is channel]
+        records = _records(case, channel)
         seen = [high_frequency_noise(item.time, item.values) for item in records]
         known = [value for value in seen if np.isfinite(value) and value > _NONE * channel.noise_std]
-        steps = [step for item in records if (step := detect_resolution(item.values)) is not None]
         if not known:
             continue
         scatter, unit = float(np.median(known)), records[0].unit
-        largest = max([scatter, *steps])
+        largest = max([scatter, *_steps(records)])
         swing = max(float(np.nanstd(item.values)) for item in records)
         slipped = channel.noise_std > max(_SLIP * largest, _LITTLE * swing)
         slipped |= channel.signal == "theta" and channel.noise_std < scatter / _SLIP
@@ -56,9 +56,11 @@ def stated_noise_is_seen(case: Case) -> Iterator[Finding]:
 def resolution_is_seen(case: Case) -> Iterator[Finding]:
     """Values lie on the grid of the resolution that the file states, not on a finer one."""
     for channel in case.drive.channels:
-        records = [recorded for _, other, recorded in case.recorded() if other is channel]
-        steps = [step for item in records if (step := detect_resolution(item.values)) is not None]
-        if channel.resolution is None or not steps or channel.resolution <= _RATIO_SLIP * min(steps):
+        if channel.resolution is None:
+            continue
+        records = _records(case, channel)
+        steps = _steps(records)
+        if not steps or channel.resolution <= _RATIO_SLIP * min(steps):
             continue
         unit = records[0].unit
         stated = quantity_text(channel.resolution, unit)
@@ -66,6 +68,16 @@ def resolution_is_seen(case: Case) -> Iterator[Finding]:
         where = case.at(f"channels.{channel.name}.resolution")
         remedy = "convert it, or leave it out: it is measured then"
         yield Finding(where, what, f"the step in {unit}", remedy, "warning")
+
+
+def _records(case: Case, channel: Channel) -> list[RecordedChannel]:
+    """Return a channel in all recordings that have it."""
+    return [recorded for _, other, recorded in case.recorded() if other is channel]
+
+
+def _steps(records: Sequence[RecordedChannel]) -> list[float]:
+    """Return the steps on which values lie, of the recordings where they lie on some."""
+    return [step for item in records if (step := detect_resolution(item.values)) is not None]
 
 
 def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
@@ -87,12 +99,12 @@ def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
 
 def _factor(case: Case, first: Channel, second: Channel, use: RecordingUse) -> float | None:
     """Return the speed that one sensor shows over what another and the ratio say; None where they see no one motion."""
-    motions = [case.seen_by(channel, use) for channel in (first, second)]
     ratio = case.ratio(first.part, second.part)
-    if motions[0] is None or motions[1] is None or ratio is None:
+    moved = None if ratio is None else case.seen_by(first, use)
+    shown = None if moved is None else case.seen_by(second, use)
+    if ratio is None or moved is None or shown is None:
         return None
-    expected, shown = motions[0].through(1.0 / ratio), motions[1]
-    known = _at(expected, shown.time)
+    known = _at(moved.through(1.0 / ratio), shown.time)
     power = float(known @ known), float(shown.omega @ shown.omega)
     if not min(power) > 0.0:
         return None
