@@ -56,6 +56,8 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "next_experiment": None if following is None else _next_experiment(following),
         "significance": diagnosis.level,
         "assumptions": _assumptions(diagnosis),
+        "effort": diagnosis.effort,
+        "cut_short": diagnosis.cut_short,
         "seconds": diagnosis.seconds,
         "channel_units": _units(diagnosis),
         "provenance": provenance(problem, "diagnose"),
@@ -178,13 +180,13 @@ def _round(diagnosis: Diagnosis, item: Round, reshaped: bool) -> dict[str, Any]:
 
 
 def _cause(item: Round, rival: Rival, chance: float, available: float) -> dict[str, Any]:
-    own = _own(item.before, rival)
+    own, heldout = _own(item.before, rival), float(np.sum(rival.gains))
     return {
         **_explained(rival.key),
         "probability": chance,
         "predicted_gain": _share(rival.screened.gain, available),
         "refit_gain": _share(item.before.objective - rival.standing.objective, available),
-        "heldout_gain": _share(float(np.sum(rival.gains)), available),
+        "heldout_gain": None if math.isnan(heldout) else _share(heldout, available),
         "p_value": rival.screened.p_value,
         "parameters": {name: value for name, value in rival.standing.values.items() if name in own},
     }

@@ -32,6 +32,7 @@ from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, w
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.execution.content import fingerprint
+from friction_ocp.execution.effort import once
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.plain import plain, restored
 from friction_ocp.execution.run import run_tasks
@@ -75,6 +76,7 @@ class Bench:
     seat: Seat
 
     @cached_property
+    @once
     def base(self) -> FittedModel:
         """The base model on its footing; a process builds that of the rounds of one diagnosis once."""
         key = fingerprint(Workshop(self.problem).fingerprint, json.dumps([self.footing, self.base_point]))
@@ -85,6 +87,7 @@ class Bench:
         return _built[key]
 
     @cached_property
+    @once
     def current(self) -> FittedModel:
         """The model of this round."""
         base = self.base
@@ -93,6 +96,7 @@ class Bench:
         return seated(with_drive(base.model, self.seat.drive), base.footing, self.seat.point)
 
     @cached_property
+    @once
     def unfitted(self) -> FittedModel | None:
         """The current model at the guesses of its problem, and additions as they are: where to begin if it is astray.
 
@@ -119,11 +123,13 @@ class Bench:
         return blocks_of(self.unfitted.linear.rows)
 
     @cached_property
+    @once
     def clues(self) -> Clues:
         """What the current model says about sizes."""
         return clues_of(self.current)
 
     @cached_property
+    @once
     def slow(self) -> tuple[SlowTorque, ...]:
         """Slow torques and errors that the current model lacks."""
         return slow_torques(self.current, self.clues)

@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.fitting import FittedModel, begun_at_size, completed
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
+from friction_ocp.diagnosis.worth import Key
 from friction_ocp.effects.effect import Augmentation, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
@@ -84,20 +85,33 @@ class Crew:
                 best[item.key] = Refit(item, end["point"], cost)
         return restored(costs), list(best.values())
 
-    def rivals(self, tried: Sequence[Refit], without: FloatArray) -> list[Rival]:
-        """Return candidates whose refits are completed, with what they gain on recordings left out."""
+    def rivals(self, tried: Sequence[Refit], without: FloatArray, asked: Mapping[Key, float]) -> list[Rival]:
+        """Return candidates whose refits are completed, with what they gain on recordings left out.
+
+        That is not looked at (NaN) where they do not gain what is `asked` of them where they were fitted.
+        """
         tasks = [
-            self._task("complete", refit.key, complete_candidate, (screened_document(refit.screened), refit.point))
+            self._task(
+                "complete",
+                refit.key,
+                complete_candidate,
+                (screened_document(refit.screened), refit.point, asked[refit.key]),
+            )
             for refit in tried
         ]
         values = self._run("completing refits", tasks, 0.75)
         return [self._rival(refit.screened, value, without) for refit, value in zip(tried, values, strict=True)]
 
-    def retried(self, known: Sequence[Rival], without: FloatArray) -> list[Rival]:
+    def retried(self, known: Sequence[Rival], without: FloatArray, asked: Mapping[Key, float]) -> list[Rival]:
         """Return rivals, each from the best of the end that is known and those that begin at other sizes."""
         pairs = [(item, k) for item in known for k in range(len(OTHER_SIZES))]
         tasks = [
-            self._task(f"retry-{k}", item.key, retry_candidate, (screened_document(item.screened), OTHER_SIZES[k]))
+            self._task(
+                f"retry-{k}",
+                item.key,
+                retry_candidate,
+                (screened_document(item.screened), OTHER_SIZES[k], asked[item.key]),
+            )
             for item, k in pairs
         ]
         values = self._run("trying other sizes", tasks, 0.75)
@@ -160,18 +174,21 @@ def _refitted(start: FittedModel, item: Screened) -> Json:
     return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
 
 
-def complete_candidate(bench: Bench, content: Json, point: Json) -> Json:
+def complete_candidate(bench: Bench, content: Json, point: Json, asked: float) -> Json:
     """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
-    return _judged(bench, completed(seat_candidate(bench, restored_screened(bench, content), point)))
+    return _judged(bench, completed(seat_candidate(bench, restored_screened(bench, content), point)), asked)
 
 
-def retry_candidate(bench: Bench, content: Json, scale: float) -> Json:
+def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> Json:
     """Do the same from a multiple of the predicted size; null where the simulation breaks down."""
     fitted = completed(begun_at_size(bench.current, restored_screened(bench, content), scale))
-    return _judged(bench, fitted) if fitted.holds else None
+    return _judged(bench, fitted, asked) if fitted.holds else None
 
 
-def _judged(bench: Bench, fitted: FittedModel) -> Json:
+def _judged(bench: Bench, fitted: FittedModel, asked: float) -> Json:
+    if bench.current.cost - fitted.cost < asked:
+        costs, standing = np.full(bench.blocks.count, np.nan), Standing.of(fitted, material=False)
+        return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
     costs = blocks_like(bench.current, fitted, bench.blocks)
     standing = Standing.of(fitted, bench.standard.is_material(fitted))
     return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}

@@ -14,7 +14,7 @@ from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
-from friction_ocp.diagnosis.options import Considered, considered, level_of
+from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
 from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
@@ -50,6 +50,10 @@ class Diagnosis:
     blind: tuple[BlindSpot, ...]
     """Effects that the final model lacks and that the recordings, made too fast, would not show."""
     seconds: float
+    effort: float = 0.0
+    """What the search took, over its limit."""
+    cut_short: bool = False
+    """Whether the search ended there, with things left to try."""
     stated: Problem | None = None
     """The problem as it was given, where its inputs are not read as it states."""
 
@@ -153,13 +157,13 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     from the output folder where an earlier run ended them.
     """
     began = time.perf_counter()
-    level, meant = level_of(problem), considered(problem)
+    level, meant, patience = level_of(problem), considered(problem), effort_of(problem)
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
         run = replace(execution, executor=executor)
         bench = open_bench(problem, run)
         base = bench.base
-        search = Search(bench, run, meant, level, tell)
+        search = Search(bench, run, meant, level, tell, patience)
         search.go()
     rounds, accepted = search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)
@@ -182,6 +186,8 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
             slow=ended.slow,
             blind=blind_spots(current, left, ended.clues, meant),
             seconds=time.perf_counter() - began,
+            effort=search.effort,
+            cut_short=search.cut_short,
         )
     )
 

@@ -24,6 +24,7 @@ from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.splicing import carried_on, spliced
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
+from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
 
@@ -99,6 +100,7 @@ class FittedModel:
         return FAR < self.missed < np.inf
 
     @cached_property
+    @once
     def cost(self) -> float:
         """The same with the noise that this model's own inertia would show: what models are compared by."""
         program, wider = with_own_noise(self.linear.program, self.model, self.footing, self.theta)
@@ -299,8 +301,13 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 
 
 def completed(fitted: FittedModel) -> FittedModel:
-    """Continue a refit to its end, around the kinks of exact friction that catch it."""
-    return freed(timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes)))
+    """Continue a refit to its end, around the kinks of exact friction that catch it.
+
+    One that is still far from the recordings there lacks more than better nodes give back: it is not freed until it is
+    accepted, which most of those are not.
+    """
+    ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
+    return ended if ended.astray else freed(ended)
 
 
 def freed(fitted: FittedModel) -> FittedModel:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+import numpy as np
+
 from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
@@ -14,6 +16,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem
 
 SIGNIFICANCE = 0.01
+EFFORT = 1.0
 AT = " at "
 """Between an effect and the component that an entry of `effects` or `exclude` is about."""
 
@@ -68,6 +71,16 @@ def level_of(problem: Problem) -> float:
             Finding(f"{_where(problem)}.significance", f"this is {level!r}", "a number between 0 and 0.5")
         )
     return float(level)
+
+
+def effort_of(problem: Problem) -> float:
+    """Return how long the search goes on, over what it usually does; raises FrictionOcpError where it is no number."""
+    stated = problem.diagnosis.get("effort", EFFORT)
+    if not isinstance(stated, (int, float)) or isinstance(stated, bool) or not 0.0 < stated < np.inf:
+        raise FrictionOcpError(
+            Finding(f"{_where(problem)}.effort", f"this is {stated!r}", "a number above 0, 1 is the usual effort")
+        )
+    return float(stated)
 
 
 def considered(problem: Problem) -> Considered:

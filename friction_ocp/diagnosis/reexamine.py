@@ -3,7 +3,7 @@ found to be what the recordings cannot tell from it."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -12,6 +12,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, completed, polished, without_addition
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
@@ -19,6 +20,7 @@ from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import Key, required
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Task
@@ -64,7 +66,7 @@ def exchanged(
     for index, item in enumerate(done[:-1]):
         held = item.accepted
         if held is not None and _is_open(done, index, accepted):
-            for rival in _others(item.choice, accepted):
+            for rival in _others(bench, item.choice, accepted):
                 keys = _swapped(accepted, held.key, rival.key)
                 wanted[held.key, rival.key] = _Wanted(keys, rival.standing.values)
     known = _fits(bench, run, wanted)
@@ -73,7 +75,7 @@ def exchanged(
         if held is None or not _is_open(done, index, accepted):
             continue
         seen, tried, made = set[Key](), list[Rival](), {held.key: accepted}
-        others = _others(item.choice, accepted)
+        others = _others(bench, item.choice, accepted)
         while others:
             rival = others.pop(0)
             seen.add(rival.key)
@@ -92,7 +94,7 @@ def exchanged(
                 held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
                 item = replace(item, accepted=rival, choice=turned(item.choice, rival))
                 tried = [other.refitted(other.fitted, -benchmark.dearer(other.fitted)) for other in former]
-                others = _others(item.choice, [*accepted, *seen])
+                others = _others(bench, item.choice, accepted, seen)
             else:
                 tried.append(rival.refitted(swapped, gains))
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
@@ -170,9 +172,24 @@ def fit_instead(bench: Bench, keys: Sequence[Key], alone: Mapping[str, float] | 
     return point_document(fitted) if fitted.holds else None
 
 
-def _others(choice: Choice, known: Sequence[Key]) -> list[Rival]:
-    others = [rival for rival in choice.rivals if rival.key not in known]
+def _others(bench: Bench, choice: Choice, accepted: Sequence[Key], seen: Collection[Key] = ()) -> list[Rival]:
+    """Return the rivals of a round to be tried in the place of what it has found, the best first.
+
+    One that was accepted since may do the work of both, in a more general shape.
+    """
+    others = [
+        rival
+        for rival in choice.rivals
+        if rival.key not in seen and (rival.key not in accepted or _may_grow(bench, rival.key, accepted))
+    ]
     return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
+
+
+def _may_grow(bench: Bench, key: Key, accepted: Sequence[Key]) -> bool:
+    if accepted.count(key) > 1:
+        return False
+    effect, place = key
+    return effects()[effect].reshaped(_drive(bench, [key]), place, clues_of(bench.base)) is not None
 
 
 def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:

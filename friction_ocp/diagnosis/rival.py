@@ -50,7 +50,7 @@ class Rival:
     screened: Screened
     standing: Standing
     gains: FloatArray
-    """(blocks,) decrease of the held-out objective against the model without it."""
+    """(blocks,) decrease of the held-out objective against the model without it; NaN where that was not looked at."""
     seat: Callable[[], FittedModel]
     """Sets up the fit, which takes longer than most rivals are worth."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, without_addition
+from friction_ocp.diagnosis.fitting import MOST_OF, UNIMPORTANT, freed, without_addition
 from friction_ocp.diagnosis.free_gap import carries_over, left_out_errors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.options import NONE, Considered, places
@@ -31,6 +31,7 @@ from friction_ocp.diagnosis.worth import (
     with_resembling,
 )
 from friction_ocp.effects.registry import effects
+from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
@@ -43,6 +44,9 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
+MOST_EFFORT = 2500.0
+"""Simulations of the base model with derivatives from which nothing further is tried: about two minutes for recordings
+of 20,000 samples on two processors."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -58,21 +62,40 @@ class Search:
     """What competes."""
     level: float
     tell: Tell
+    patience: float = 1.0
+    """Effort that the search may take, over the usual one."""
     rounds: list[Round] = field(default_factory=list[Round])
     accepted: list[Key] = field(default_factory=list[Key])
     taken_back: list[Round] = field(default_factory=list[Round])
     """Rounds that no longer count, with what they had added."""
+    cut_short: bool = False
+    """Whether the search ended at its limit of effort, with things left to try."""
     _begun: int = 0
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
+        base, before = self.bench.base.linear, effort()
+        base.program.linearise(base.point)
+        self._first, self._each = effort(), max(effort() - before, 1.0)
+
+    @property
+    def effort(self) -> float:
+        """What the search has taken, over what it may take."""
+        return (effort() - self._first) / (self._each * MOST_EFFORT * self.patience)
+
+    def _exhausted(self) -> bool:
+        """Whether nothing further is to be tried; whoever asks had something to try."""
+        if self.effort < 1.0:
+            return False
+        self.cut_short = True
+        return True
 
     def go(self) -> None:
         """Add until noise is left, nothing helps or the rounds are used up."""
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
-                done = self._from_better() or self._from_alias() or self._reopened() or done
+                done = self._elsewhere() or done
             self.rounds.append(done)
             if done.accepted is None:
                 break
@@ -84,10 +107,16 @@ class Search:
             self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
 
+    def _elsewhere(self) -> Round | None:
+        """Look for an addition from other models than the current one."""
+        for way in (self._from_better, self._from_alias, self._reopened):
+            done = None if not self.accepted or self._exhausted() else way()
+            if done is not None:
+                return done
+        return None
+
     def _from_better(self) -> Round | None:
         """Go on from a better fit of what was accepted, if there is one: what is left may be no more than that."""
-        if not self.accepted:
-            return None
         known, better = self.bench.current, bettered(self.bench, self.run)
         notable = NOTABLE * (known.objective - 0.5 * samples(known))
         if better is self.bench or known.objective - better.current.objective < notable:
@@ -96,17 +125,26 @@ class Search:
         return self._round(self.bench, self.accepted, self.meant)
 
     def _from_alias(self) -> Round | None:
-        """Go on from what the recordings could not tell from the last addition, where that itself leads nowhere.
+        """Go on from what might be in the place of the last addition, where that itself leads nowhere.
 
-        Of two effects the one may be found only beside the other.
+        That is what the recordings could not tell from it, and what came as near to them where it was fitted. Of two
+        effects the one may be found only beside the other, and what is more general than another may have more to it.
+        Not where the model is as far from the recordings as before: what came nearest to them then says little.
         """
         last = self.rounds[-1] if self.rounds else None
         if last is None or last.accepted is None:
             return None
+        if self.bench.current.astray and last.accepted.standing.cost > MOST_OF * last.before.cost:
+            return None
         before = [key for key in self.accepted if key != last.accepted.key]
-        for rival in shown(last.choice.aliases):
-            if rival.key in self.accepted or is_same(rival, last.accepted):
+        cost, tried = last.accepted.standing.cost, {*self.accepted}
+        nearer = [rival for rival in last.choice.rivals if rival.standing.cost < cost]
+        for rival in (*shown(last.choice.aliases), *nearer):
+            if rival.key in tried or is_same(rival, last.accepted):
                 continue
+            if self._exhausted():
+                break
+            tried.add(rival.key)
             bench, keys = self.bench.at(rival.fitted), [*before, rival.key]
             done = self._round(bench, keys, self.meant)
             if done.accepted is not None:
@@ -126,6 +164,8 @@ class Search:
             held = item.accepted
             if held is None or self.accepted.count(held.key) != 1:
                 continue
+            if self._exhausted():
+                break
             kept = [key for key in self.accepted if key != held.key]
             simpler = without_addition(current, with_additions(base, kept))
             if not simpler.holds:
@@ -141,7 +181,8 @@ class Search:
     def _take(self, rival: Rival) -> None:
         """Add what a round has found; drop or exchange earlier additions that it makes superfluous."""
         self.tell("examining earlier additions again", 0.0)
-        bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
+        fitted = freed(rival.fitted) if rival.fitted.astray else rival.fitted
+        bench, keys = self.bench.at(fitted), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
         self.bench = bench.at(current)
         if innovations(current).significant(self.level):
@@ -202,7 +243,8 @@ class Search:
         unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
-        for rivals in completed_rivals(crew, chosen, unfitted, known, enough):
+        asked = {key: -np.inf if key in again else enough for key in known}
+        for rivals in completed_rivals(crew, chosen, unfitted, known, asked, self._exhausted):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)
@@ -224,12 +266,14 @@ def completed_rivals(
     chosen: Sequence[Screened],
     unfitted: Sequence[Screened],
     known: Mapping[Key, Screened],
-    enough: float,
+    asked: Mapping[Key, float],
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> Iterator[list[Rival]]:
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
-    What fits best where it was fitted may be worth nothing on recordings left out. Where it gains `enough` and yet will
-    not do, it may have come to rest on the way: at last the best of those begin at other sizes.
+    What fits best where it was fitted may be worth nothing on recordings left out. Where it gains what is `asked` of it
+    and yet will not do, it may have come to rest on the way: at last the best of those begin at other sizes. The first
+    are completed in any case, further ones as long as the search is not `exhausted`.
     """
     if not chosen:
         return
@@ -245,12 +289,15 @@ def completed_rivals(
     alike = effects()[refits[order[0]].key[0]].resembles
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
-    rivals = crew.rivals([refits[k] for k in first], without)
+    rivals = crew.rivals([refits[k] for k in first], without, asked)
     yield rivals
+    if others and exhausted():
+        return
     if others:
-        rivals = [*rivals, *crew.rivals([refits[k] for k in others], without)]
+        rivals = [*rivals, *crew.rivals([refits[k] for k in others], without, asked)]
         yield rivals
     rivals.sort(key=lambda item: item.standing.cost)
-    again = [item for item in rivals if current.cost - item.standing.cost >= enough and item.screened.starts][:FINISHED]
-    if again:
-        yield [*crew.retried(again, without), *(item for item in rivals if item not in again)]
+    able = [item for item in rivals if current.cost - item.standing.cost >= asked[item.key] and item.screened.starts]
+    again = able[:FINISHED]
+    if again and not exhausted():
+        yield [*crew.retried(again, without, asked), *(item for item in rivals if item not in again)]

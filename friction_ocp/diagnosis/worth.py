@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import effects
+from friction_ocp.execution.effort import once
 
 REFITTED = 6
 """Candidates that are refitted in a round."""
@@ -89,6 +90,7 @@ class Standard:
     current: FittedModel
 
     @cached_property
+    @once
     def _before(self) -> FreeErrors:
         return free_errors(self.current, held_out=False)
 

@@ -14,7 +14,7 @@ from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.whole_file import whole_file
 
 FORMAT = "friction-ocp-task/1"
-"""{format, key, fingerprint, seconds} with `value`, or with `error` and `trace`."""
+"""{format, key, fingerprint, seconds, effort} with `value`, or with `error` and `trace`."""
 
 
 class AbstractLedger(ABC):
@@ -55,7 +55,7 @@ class Ledger(AbstractLedger):
         path = self._path(task, shared_fingerprint)
         if path is None or outcome.lost:
             return
-        content = {"format": FORMAT, "key": task.key, "seconds": outcome.seconds}
+        content = {"format": FORMAT, "key": task.key, "seconds": outcome.seconds, "effort": outcome.effort}
         content |= {"error": outcome.error, "trace": outcome.trace} if outcome.error else {"value": outcome.value}
         with whole_file(path) as staged:
             staged.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
@@ -70,4 +70,5 @@ class Ledger(AbstractLedger):
 
 def _outcome(task: Task, content: dict[str, Any]) -> Outcome:
     error, trace = (str(content.get(name, "")) for name in ("error", "trace"))
-    return Outcome(task.key, content.get("value"), error, trace, float(content.get("seconds", 0.0)))
+    seconds, effort = (float(content.get(name, 0.0)) for name in ("seconds", "effort"))
+    return Outcome(task.key, content.get("value"), error, trace, seconds, effort)

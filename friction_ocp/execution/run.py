@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
+from friction_ocp.execution.effort import count
 from friction_ocp.execution.executor import AbstractExecutor
 from friction_ocp.execution.ledger import AbstractLedger, Ledger
 from friction_ocp.execution.task import Outcome, Task
@@ -46,7 +47,7 @@ def run_tasks(
     """Return the outcome of every task by its key, in the order of the tasks.
 
     An outcome is on disk before the next one is awaited. An error is an outcome; an interrupt is raised, and the next
-    run with the same ledger goes on from there.
+    run with the same ledger goes on from there. The effort of all tasks counts, also of those on disk.
     """
     by_key = {task.key: task for task in tasks}
     if len(by_key) != len(tasks):
@@ -67,4 +68,5 @@ def run_tasks(
                 ledger.keep(by_key[outcome.key], shared_fingerprint, outcome)
                 outcomes[outcome.key] = outcome
                 tell(outcome.key)
+    count(sum(outcome.effort for outcome in outcomes.values()))
     return {task.key: outcomes[task.key] for task in tasks}

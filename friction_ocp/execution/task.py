@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.execution.effort import effort, uncounted
 
 Json = Any
 """What a JSON file holds: None, bool, int, finite float, str, lists and dictionaries of these."""
@@ -34,18 +35,20 @@ class Outcome:
     trace: str = ""
     """Where the error came from, for whoever repairs it."""
     seconds: float = 0.0
+    effort: float = 0.0
+    """What it counted (`effort.count`)."""
     lost: bool = False
     """The process that worked on it ended before the task did; another run may have more luck."""
 
 
 def attempt(task: Task, shared: Any) -> Outcome:
     """Do a task; an error is an outcome like any other, only an interrupt gets through."""
-    began = time.perf_counter()
-    try:
-        value = task.function(shared, *task.arguments)
-    except FrictionOcpError as error:
-        return Outcome(task.key, error=str(error), seconds=time.perf_counter() - began)
-    except Exception as error:
-        text = f"{type(error).__name__}: {error}"
-        return Outcome(task.key, error=text, trace=traceback.format_exc(), seconds=time.perf_counter() - began)
-    return Outcome(task.key, value, seconds=time.perf_counter() - began)
+    began, before = time.perf_counter(), effort()
+    with uncounted():  # whoever asked for the task counts it
+        try:
+            found = Outcome(task.key, task.function(shared, *task.arguments))
+        except FrictionOcpError as error:
+            found = Outcome(task.key, error=str(error))
+        except Exception as error:
+            found = Outcome(task.key, error=f"{type(error).__name__}: {error}", trace=traceback.format_exc())
+        return replace(found, seconds=time.perf_counter() - began, effort=effort() - before)

@@ -268,6 +268,7 @@ class DiagnosisSection(Section):
     effects: Any = None
     exclude: Any = None
     significance: Any = None
+    effort: Any = None
 
 
 class LimitsSection(Section):

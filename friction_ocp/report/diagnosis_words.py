@@ -28,13 +28,22 @@ def diagnosis_sentence(result: Json) -> str:
         case _ if accepted and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
-            return f"There is a gap beyond the noise; {where}, but {doubt}. The cause is probably another."
+            cause = "The cause is probably another."
+            return f"There is a gap beyond the noise; {where}, but {doubt}. {cause}{_cut_short(result)}"
         case _ if accepted:
             found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
             left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
-            return f"{found}; {left}{_stand_ins(result)}."
+            return f"{found}; {left}{_stand_ins(result)}.{_cut_short(result)}"
         case _:
-            return f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
+            told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
+            return f"{told}{_cut_short(result)}"
+
+
+def _cut_short(result: Json) -> str:
+    """Say that there was more to try, and how to have it tried."""
+    if not result.get("cut_short"):
+        return ""
+    return " The search ended at its usual effort with more to try: `effort: 3` under `diagnosis:` lets it go on."
 
 
 def _with_rivals(result: Json) -> list[str]:

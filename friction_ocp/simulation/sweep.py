@@ -11,6 +11,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import SteppedDrive, stepped
+from friction_ocp.execution.effort import count
 from friction_ocp.kept import kept
 from friction_ocp.simulation.compiled import compile_sweep
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
@@ -68,7 +69,9 @@ class Sweep:
     def run_many(self, requests: Sequence[SweepRequest]) -> list[SweepResult]:
         """Simulate several recordings, side by side where there is more than one processor."""
         results = [self._empty(request) for request in requests]
-        self.kernel.run([Piece(*pair) for pair in zip(requests, results, strict=True)], worker_count())
+        pieces = [Piece(*pair) for pair in zip(requests, results, strict=True)]
+        count(sum(piece.effort for piece in pieces))
+        self.kernel.run(pieces, worker_count())
         return results
 
     def _empty(self, request: SweepRequest) -> SweepResult:

@@ -13,7 +13,7 @@ from diagnosis_cases import VISCOUS, axis, write_case
 from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitting import FittedModel, fit_base
-from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.held_out import held_out, told
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
@@ -119,3 +119,10 @@ def test_the_score_test_keeps_its_level(fitted: FittedModel) -> None:
     values = [score(rows, blocks, rows.absorbed(column[:, None])).p_value for column in smooth.T]
     assert np.mean(np.array(values) < 0.05) < 0.2
     assert np.median(values) > 0.2
+
+
+def test_what_breaks_down_on_recordings_left_out_is_not_free() -> None:
+    """Rows behind a breakdown cost as much as the worst before it, and no less than a large error."""
+    costs = told(np.array([1.0, 3e7, np.nan, np.inf]))
+    assert list(costs) == [1.0, 3e7, 3e7, 3e7]
+    assert list(told(np.array([2.0, np.nan]))) == [2.0, 1e6] and list(told(np.array([2.0, 5.0]))) == [2.0, 5.0]

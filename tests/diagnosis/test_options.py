@@ -10,7 +10,7 @@ import pytest
 from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.fitting import fit_base
-from friction_ocp.diagnosis.options import considered, level_of, places
+from friction_ocp.diagnosis.options import considered, effort_of, level_of, places
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import FrictionOcpError
@@ -66,6 +66,14 @@ def test_a_level_is_a_probability(problem: Problem, level: object) -> None:
     """Nothing else is taken."""
     with pytest.raises(FrictionOcpError, match=r"between 0 and 0\.5"):
         level_of(_said(problem, {"significance": level}))
+
+
+@pytest.mark.parametrize("effort", [0, -1.0, "long", True, float("inf")])
+def test_an_effort_is_a_number_above_zero(problem: Problem, effort: object) -> None:
+    """Nothing else is taken; without one it is the usual one."""
+    with pytest.raises(FrictionOcpError, match="above 0"):
+        effort_of(_said(problem, {"effort": effort}))
+    assert effort_of(problem) == 1.0 and effort_of(_said(problem, {"effort": 3})) == 3.0
 
 
 def test_parts_that_an_effect_added_are_no_place_for_another(problem: Problem) -> None:

@@ -11,6 +11,7 @@ from friction_ocp.diagnosis.crew import Crew, Refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.search import completed_rivals
+from friction_ocp.diagnosis.worth import Key
 from friction_ocp.effects.effect import Augmentation
 
 SAMPLES, COST = 1000, 3000.0
@@ -18,7 +19,7 @@ SAMPLES, COST = 1000, 3000.0
 DRIVE: Any = None
 
 
-def completed(*tried: tuple[str, float, float]) -> list[list[str]]:
+def completed(*tried: tuple[str, float, float], exhausted: bool = False) -> list[list[str]]:
     """Return the effects whose refits are completed, turn by turn, from (effect, predicted gain, cost after steps)."""
     screened = [Screened(effect, "motor", gain, 0.0, (), Augmentation(DRIVE, {}, ())) for effect, gain, _ in tried]
     refits = [Refit(item, None, cost) for item, (_, _, cost) in zip(screened, tried, strict=True)]
@@ -26,15 +27,20 @@ def completed(*tried: tuple[str, float, float]) -> list[list[str]]:
     current = SimpleNamespace(cost=COST, linear=SimpleNamespace(rows=rows))
     turns = list[list[str]]()
 
-    def rivals(some: list[Refit], without: Any) -> list[Rival]:
+    def rivals(some: list[Refit], without: Any, asked: dict[Key, float]) -> list[Rival]:
         turns.append([refit.key[0] for refit in some])
-        return [cast(Any, SimpleNamespace(standing=SimpleNamespace(cost=refit.cost), screened=0)) for refit in some]
+        return [
+            cast(Any, SimpleNamespace(standing=SimpleNamespace(cost=refit.cost), screened=0, key=refit.key))
+            for refit in some
+        ]
 
     def without(shortlist: list[Screened], unfitted: list[Screened]) -> tuple[None, list[Refit]]:
         return None, refits
 
     crew = SimpleNamespace(bench=SimpleNamespace(current=current), without=without, rivals=rivals)
-    found = completed_rivals(cast(Crew, crew), screened, [], {item.key: item for item in screened}, np.inf)
+    asked = {item.key: np.inf for item in screened}
+    known = {item.key: item for item in screened}
+    found = completed_rivals(cast(Crew, crew), screened, [], known, asked, lambda: exhausted)
     list(found)
     return turns
 
@@ -51,3 +57,9 @@ def test_the_best_come_first_and_the_others_if_those_will_not_do() -> None:
     assert turns == [["cogging", "unbalance"], ["warm_up"]]
     turns = completed(("stribeck", 2400.0, 600.0), ("cogging", 0.0, 700.0), ("polyline_break", 50.0, 2900.0))
     assert turns == [["stribeck", "cogging", "polyline_break"]]
+
+
+def test_at_the_limit_of_effort_only_the_best_are_completed() -> None:
+    """A search that has taken long enough does not go through what looks worse."""
+    tried = (("cogging", 2400.0, 2000.0), ("unbalance", 100.0, 700.0), ("warm_up", 50.0, 2900.0))
+    assert completed(*tried, exhausted=True) == [["cogging", "unbalance"]]

@@ -67,6 +67,15 @@ def cogging() -> Plant:
     return replace(plain, motors=(replace(plain.motors[0], cogging=PlantRipple(3.1, COSINES, SINES)),))
 
 
+def cogging_once_a_turn() -> Plant:
+    """Return an axis that cogs once a turn, which looks like unbalance, and has overtones, which do not."""
+    plain = axis()
+    return replace(
+        plain,
+        motors=(replace(plain.motors[0], cogging=PlantRipple(2.0 * np.pi, (0.03, 0.02, 0.01), (0.01, 0.0, 0.01))),),
+    )
+
+
 def diagnosed(folder: Path, plant: Plant, effects: list[str]) -> dict[str, Any]:
     """Return the result document of a diagnosis with a narrow catalogue."""
     path = write_case(folder, plant, effects=effects)
@@ -155,3 +164,10 @@ def test_the_sharpness_of_saturation_is_found(tmp_path: Path) -> None:
     found = values_of(diagnosed(tmp_path, plant, ["torque_saturation", "quadratic_drag"]))
     assert found["saturation"] == pytest.approx(limit**-2.0, rel=0.05)
     assert found["saturation_sharpness"] == pytest.approx(sharpness, rel=0.1)
+
+
+def test_what_does_the_work_of_two_in_a_more_general_shape_takes_their_place(tmp_path: Path) -> None:
+    """Unbalance explains a wave once a turn, and cogging one of its overtones: cogging with overtones is all of it."""
+    result = diagnosed(tmp_path, cogging_once_a_turn(), ["unbalance", "cogging"])
+    assert [item["effect"] for item in result["accepted"]] == ["cogging"]
+    assert not result["remainder"]["significant"]

@@ -7,6 +7,8 @@ import signal
 import time
 from pathlib import Path
 
+from friction_ocp.execution.effort import count
+
 
 def noted(folder: Path, name: str, value: float) -> dict[str, float]:
     """Leave a line that says that this was done, and return a value."""
@@ -39,3 +41,11 @@ def dying(folder: Path, name: str) -> dict[str, float]:
 def environment(folder: Path, name: str) -> str | None:
     """Return a variable of the worker's environment."""
     return os.environ.get(name)
+
+
+def counting(folder: Path, work: float) -> float:
+    """Count some work; less than none is an error."""
+    count(work)
+    if work < 0.0:
+        raise ValueError("no work at all")
+    return work

@@ -78,3 +78,11 @@ def test_additions_that_were_taken_back_are_told_once_with_the_reason() -> None:
     assert alone == [
         "Added on the way and taken back, because nothing came nearer to the recordings left out: drive lag at servo."
     ]
+
+
+def test_a_search_that_ended_early_says_so() -> None:
+    """And how to have the rest tried; one that tried everything says nothing."""
+    for accepted in ([], [COGGING]):
+        said = diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=True))
+        assert said.endswith("`effort: 3` under `diagnosis:` lets it go on.")
+        assert "effort" not in diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=False))
