@@ -44,9 +44,9 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MOST_EFFORT = 2500.0
-"""Simulations of the base model with derivatives from which nothing further is tried: about two minutes for recordings
-of 20,000 samples on two processors."""
+MOST_STEPS, MOST_RUNS = 1.3e9, 2500.0
+"""Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
+which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -76,12 +76,13 @@ class Search:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
         base, before = self.bench.base.linear, effort()
         base.program.linearise(base.point)
-        self._first, self._each = effort(), max(effort() - before, 1.0)
+        self._first, once = effort(), effort() - before
+        self._most = self.patience * max(MOST_STEPS, MOST_RUNS * once)
 
     @property
     def effort(self) -> float:
         """What the search has taken, over what it may take."""
-        return (effort() - self._first) / (self._each * MOST_EFFORT * self.patience)
+        return (effort() - self._first) / self._most
 
     def _exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""
