@@ -35,8 +35,9 @@ BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
 SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
-DETOUR = 0.05
-"""Smoothing of the sign over the typical speed on the way around kinks."""
+DETOURS = (0.02, 0.004, 0.0008, 0.00016)
+"""Smoothing of the sign over the typical speed on the way around kinks, and back step by step: in one step, nodes that
+wide smoothing has moved are caught at kinks that are not theirs."""
 HARDLY = (0.0005, 0.0002)
 """The same for the nodes alone: an accelerometer sees every change of the sign, and wide smoothing leads astray."""
 NODE_STEPS = 8
@@ -379,6 +380,8 @@ def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
 
 
 def around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:
-    """Solve again from where friction with a smoothed sign leads to."""
-    rounded = replace(program, width=DETOUR * model.speed_scale)
-    return solve_gauss_newton(program, solve_gauss_newton(rounded, point, COARSE).point, limits)
+    """Solve again from where friction with a smoothed sign leads to, less and less of it."""
+    for width in DETOURS:
+        rounded = replace(program, width=width * model.speed_scale)
+        point = solve_gauss_newton(rounded, point, COARSE).point
+    return solve_gauss_newton(program, point, limits)

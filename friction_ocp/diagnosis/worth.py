@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import DOUBTED, Excess, excess
 from friction_ocp.diagnosis.fitting import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, free_errors, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.effects.effect import Clues
@@ -105,16 +105,19 @@ class Standard:
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
         get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
-        of them is left, they have to get worse for certain: runs that drift may do so by chance.
+        of them is left, they have to get worse for certain: runs that drift may do so by chance. For the same reason
+        free runs have to get better for certain, or to leave nothing.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
-        pairs = [(before.excess(), after.excess()), (_static_excess(self.current), _static_excess(fitted))]
+        seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
+        if carries_over(before, after, seed):
+            pairs.append((before.excess(), after.excess()))
         one_step = (self._beyond, innovations(fitted).beyond)
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if before.lost:
             told = most or after.excess() <= before.excess()
         elif one_step[1] <= DOUBTED - 1.0:
-            told = most and shrink(before, after, fitted.model.problem.estimation.seed).interval95[1] >= 0.0
+            told = most and shrink(before, after, seed).interval95[1] >= 0.0
         else:
             told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()
         if told:
