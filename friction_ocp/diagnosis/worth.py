@@ -28,6 +28,9 @@ OF_ALL, OF_REST = 0.1, 0.4
 """Share of the excess that the base model left, or of what is left, that an addition must explain, one or the other: a
 law of another shape than the machine's leaves up to a fifth of its own effect, which is no further effect; of two
 effects of one size each explains half, and of that the same four fifths."""
+ALONE = 0.5
+"""Share of the excess of free runs that an addition must take away where nothing is missing from sample to sample: what
+free runs show there has one cause."""
 
 Key = tuple[str, str]
 """Effect and component."""
@@ -106,13 +109,15 @@ class Standard:
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
         get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
         of them is left, they have to get worse for certain: runs that drift may do so by chance. For the same reason
-        free runs have to get better for certain, or to leave nothing.
+        free runs have to get better for certain, or to leave nothing; where nothing is missing from sample to sample,
+        by most of what they show.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
-        if carries_over(before, after, seed):
-            pairs.append((before.excess(), after.excess()))
         one_step = (self._beyond, innovations(fitted).beyond)
+        least = ALONE if one_step[0] <= DOUBTED - 1.0 else 0.0
+        if carries_over(before, after, seed) and after.excess() <= (1.0 - least) * before.excess():
+            pairs.append((before.excess(), after.excess()))
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if before.lost:
             told = most or after.excess() <= before.excess()
