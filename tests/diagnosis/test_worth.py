@@ -53,11 +53,9 @@ def drifting(power: float, beyond: float, seed: int) -> FittedModel:
     return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear))
 
 
-@pytest.mark.parametrize(("left", "after", "material"), [(0.0, 6.0, True), (0.3, 6.0, False), (0.0, 500.0, False)])
-def test_free_runs_that_drift_may_get_worse_by_chance(
-    left: float, after: float, material: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where nothing is left from sample to sample, an addition counts unless free runs get worse for certain."""
+@pytest.fixture
+def looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take free runs and innovations from where `drifting` puts them."""
 
     def free_errors(fitted: SimpleNamespace, held_out: bool) -> FreeErrors:
         assert not held_out
@@ -68,4 +66,20 @@ def test_free_runs_that_drift_may_get_worse_by_chance(
 
     monkeypatch.setattr(worth, "free_errors", free_errors)
     monkeypatch.setattr(worth, "innovations", innovations)
+
+
+@pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(("left", "after", "material"), [(0.0, 6.0, True), (0.3, 6.0, False), (0.0, 500.0, False)])
+def test_free_runs_that_drift_may_get_worse_by_chance(left: float, after: float, material: bool) -> None:
+    """Where nothing is left from sample to sample, an addition counts unless free runs get worse for certain."""
     assert Standard(drifting(5.0, 0.7, 1)).is_material(drifting(after, left, 2)) is material
+
+
+@pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(
+    ("beyond", "share", "seed", "material"),
+    [(0.3, 0.6, 1, True), (0.0, 0.6, 1, False), (0.0, 0.3, 1, True), (0.3, 0.6, 2, False)],
+)
+def test_free_runs_have_to_get_better_for_certain(beyond: float, share: float, seed: int, material: bool) -> None:
+    """By most of what they show, where one-step predictions show nothing: runs that stick or slide differ by chance."""
+    assert Standard(drifting(20.0, beyond, 1)).is_material(drifting(20.0 * share, beyond, seed)) is material
