@@ -22,7 +22,8 @@ from friction_ocp.diagnosis.fitting import (
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.slow_torque import SlowTorque, slow_torques
+from friction_ocp.diagnosis.options import level_of
+from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues
@@ -137,7 +138,7 @@ class Bench:
     @cached_property
     def standard(self) -> Standard:
         """What additions to the current model are measured by."""
-        return Standard(self.current)
+        return Standard(self.current, silent=not significant(self.slow, level_of(self.problem)))
 
     @cached_property
     def fingerprint(self) -> str:

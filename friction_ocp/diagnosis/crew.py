@@ -85,8 +85,10 @@ class Crew:
                 best[item.key] = Refit(item, end["point"], cost)
         return restored(costs), list(best.values())
 
-    def rivals(self, tried: Sequence[Refit], without: FloatArray, asked: Mapping[Key, float]) -> list[Rival]:
-        """Return candidates whose refits are completed, with what they gain on recordings left out.
+    def rivals(
+        self, tried: Sequence[Refit], without: FloatArray, asked: Mapping[Key, float], thorough: int = 0
+    ) -> list[Rival]:
+        """Return candidates whose refits are completed, the first ones thoroughly, with their gains where left out.
 
         That is not looked at (NaN) where they do not gain what is `asked` of them where they were fitted.
         """
@@ -95,9 +97,9 @@ class Crew:
                 "complete",
                 refit.key,
                 complete_candidate,
-                (screened_document(refit.screened), refit.point, asked[refit.key]),
+                (screened_document(refit.screened), refit.point, asked[refit.key], k < thorough),
             )
-            for refit in tried
+            for k, refit in enumerate(tried)
         ]
         values = self._run("completing refits", tasks, 0.75)
         return [self._rival(refit.screened, value, without) for refit, value in zip(tried, values, strict=True)]
@@ -174,14 +176,15 @@ def _refitted(start: FittedModel, item: Screened) -> Json:
     return {"point": point_document(fitted), "cost": plain(fitted.cost)} if fitted.holds else None
 
 
-def complete_candidate(bench: Bench, content: Json, point: Json, asked: float) -> Json:
+def complete_candidate(bench: Bench, content: Json, point: Json, asked: float, thorough: bool) -> Json:
     """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
-    return _judged(bench, completed(seat_candidate(bench, restored_screened(bench, content), point)), asked)
+    seat = seat_candidate(bench, restored_screened(bench, content), point)
+    return _judged(bench, completed(seat, thorough), asked)
 
 
 def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> Json:
     """Do the same from a multiple of the predicted size; null where the simulation breaks down."""
-    fitted = completed(begun_at_size(bench.current, restored_screened(bench, content), scale))
+    fitted = completed(begun_at_size(bench.current, restored_screened(bench, content), scale), thorough=False)
     return _judged(bench, fitted, asked) if fitted.holds else None
 
 

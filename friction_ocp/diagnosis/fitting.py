@@ -301,14 +301,15 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
     return polished(model, base.footing, point.theta, point.nodes if finite else None, QUICK)
 
 
-def completed(fitted: FittedModel) -> FittedModel:
+def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
     """Continue a refit to its end, around the kinks of exact friction that catch it.
 
-    One that is still far from the recordings there lacks more than better nodes give back: it is not freed until it is
-    accepted, which most of those are not.
+    One of segments that is still far from the recordings there lacks more than better nodes give back: unless the refit
+    is to be `thorough` it is not freed until it is accepted, which most of those are not.
     """
     ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
-    return ended if ended.astray else freed(ended)
+    enough = ended.astray and fitted.footing.segment_s is not None and not thorough
+    return ended if enough else freed(ended)
 
 
 def freed(fitted: FittedModel) -> FittedModel:

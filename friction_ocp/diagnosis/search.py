@@ -128,8 +128,8 @@ class Search:
     def _from_alias(self) -> Round | None:
         """Go on from what might be in the place of the last addition, where that itself leads nowhere.
 
-        That is what the recordings could not tell from it, and what came as near to them where it was fitted. Of two
-        effects the one may be found only beside the other, and what is more general than another may have more to it.
+        That is what the recordings could not tell from it, since of two effects the one may be found only beside the
+        other; and what came as near to them and may have a more general shape, where the addition may not.
         Not where the model is as far from the recordings as before: what came nearest to them then says little.
         """
         last = self.rounds[-1] if self.rounds else None
@@ -139,7 +139,9 @@ class Search:
             return None
         before = [key for key in self.accepted if key != last.accepted.key]
         cost, tried = last.accepted.standing.cost, {*self.accepted}
-        nearer = [rival for rival in last.choice.rivals if rival.standing.cost < cost]
+        grown = bool(shapes(self.bench.current, self.bench.clues, [last.accepted.key]))
+        nearer = [rival for rival in last.choice.rivals if rival.standing.cost < cost and not grown]
+        nearer = [rival for rival in nearer if shapes(rival.fitted, self.bench.clues, [rival.key])]
         for rival in (*shown(last.choice.aliases), *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue
@@ -290,7 +292,7 @@ def completed_rivals(
     alike = effects()[refits[order[0]].key[0]].resembles
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
-    rivals = crew.rivals([refits[k] for k in first], without, asked)
+    rivals = crew.rivals([refits[k] for k in first], without, asked, FINISHED)
     yield rivals
     if others and exhausted():
         return

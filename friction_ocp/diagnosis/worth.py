@@ -91,6 +91,8 @@ class Standard:
     """What an addition to a model is measured by; what that model itself leaves is looked at once, if at all."""
 
     current: FittedModel
+    silent: bool = False
+    """Whether no slow torque or error is missing for certain: noise of samples may hide one that moves the machine."""
 
     @cached_property
     @once
@@ -109,14 +111,14 @@ class Standard:
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
         get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
         of them is left, they have to get worse for certain: runs that drift may do so by chance. For the same reason
-        free runs have to get better for certain, or to leave nothing; where nothing is missing from sample to sample,
-        by most of what they show.
+        they have to get better for certain, and by most of what they show, where nothing is missing from sample to
+        sample and no slow torque either.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
         one_step = (self._beyond, innovations(fitted).beyond)
-        least = ALONE if one_step[0] <= DOUBTED - 1.0 else 0.0
-        if carries_over(before, after, seed) and after.excess() <= (1.0 - least) * before.excess():
+        all_of_it = carries_over(before, after, seed) and after.excess() <= (1.0 - ALONE) * before.excess()
+        if not self.silent or one_step[0] > DOUBTED - 1.0 or all_of_it:
             pairs.append((before.excess(), after.excess()))
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if before.lost:

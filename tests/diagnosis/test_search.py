@@ -27,7 +27,7 @@ def completed(*tried: tuple[str, float, float], exhausted: bool = False) -> list
     current = SimpleNamespace(cost=COST, linear=SimpleNamespace(rows=rows))
     turns = list[list[str]]()
 
-    def rivals(some: list[Refit], without: Any, asked: dict[Key, float]) -> list[Rival]:
+    def rivals(some: list[Refit], without: Any, asked: dict[Key, float], thorough: int = 0) -> list[Rival]:
         turns.append([refit.key[0] for refit in some])
         return [
             cast(Any, SimpleNamespace(standing=SimpleNamespace(cost=refit.cost), screened=0, key=refit.key))
