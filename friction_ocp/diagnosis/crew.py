@@ -189,11 +189,9 @@ def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> 
 
 
 def _judged(bench: Bench, fitted: FittedModel, asked: float) -> Json:
-    if bench.current.cost - fitted.cost < asked:
-        costs, standing = np.full(bench.blocks.count, np.nan), Standing.of(fitted, material=False)
-        return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
-    costs = blocks_like(bench.current, fitted, bench.blocks)
-    standing = Standing.of(fitted, bench.standard.is_material(fitted))
+    enough = not bench.current.cost - fitted.cost < asked
+    costs = blocks_like(bench.current, fitted, bench.blocks) if enough else np.full(bench.blocks.count, np.nan)
+    standing = Standing.of(fitted, enough and bench.standard.is_material(fitted))
     return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
 
 

@@ -18,9 +18,8 @@ from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
-from friction_ocp.diagnosis.worth import Key, required
+from friction_ocp.diagnosis.worth import Key, may_grow, required
 from friction_ocp.drive.parts import Drive
-from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Task
@@ -177,19 +176,13 @@ def _others(bench: Bench, choice: Choice, accepted: Sequence[Key], seen: Collect
 
     One that was accepted since may do the work of both, in a more general shape.
     """
-    others = [
-        rival
-        for rival in choice.rivals
-        if rival.key not in seen and (rival.key not in accepted or _may_grow(bench, rival.key, accepted))
-    ]
+
+    def open_to(key: Key) -> bool:
+        times = accepted.count(key)
+        return times == 0 or (times == 1 and may_grow(_drive(bench, [key]), key, clues_of(bench.base)))
+
+    others = [rival for rival in choice.rivals if rival.key not in seen and open_to(rival.key)]
     return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
-
-
-def _may_grow(bench: Bench, key: Key, accepted: Sequence[Key]) -> bool:
-    if accepted.count(key) > 1:
-        return False
-    effect, place = key
-    return effects()[effect].reshaped(_drive(bench, [key]), place, clues_of(bench.base)) is not None
 
 
 def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:

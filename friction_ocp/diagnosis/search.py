@@ -24,6 +24,7 @@ from friction_ocp.diagnosis.worth import (
     Key,
     gain,
     innovations,
+    may_grow,
     required,
     samples,
     shapes,
@@ -139,9 +140,10 @@ class Search:
             return None
         before = [key for key in self.accepted if key != last.accepted.key]
         cost, tried = last.accepted.standing.cost, {*self.accepted}
-        grown = bool(shapes(self.bench.current, self.bench.clues, [last.accepted.key]))
-        nearer = [rival for rival in last.choice.rivals if rival.standing.cost < cost and not grown]
-        nearer = [rival for rival in nearer if shapes(rival.fitted, self.bench.clues, [rival.key])]
+        clues, nearer = self.bench.clues, list[Rival]()
+        if not may_grow(self.bench.current.model.problem.drive, last.accepted.key, clues):
+            found = [rival for rival in last.choice.rivals if rival.standing.cost < cost]
+            nearer = [rival for rival in found if may_grow(rival.screened.augmentation.drive, rival.key, clues)]
         for rival in (*shown(last.choice.aliases), *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue

@@ -14,6 +14,7 @@ from friction_ocp.diagnosis.fitting import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import once
@@ -38,8 +39,13 @@ Key = tuple[str, str]
 
 def shapes(current: FittedModel, clues: Clues, accepted: Sequence[Key]) -> list[Key]:
     """Return the accepted effects that may have a more general shape than they have."""
-    drive, catalogue = current.model.problem.drive, effects()
-    return [key for key in dict.fromkeys(accepted) if catalogue[key[0]].reshaped(drive, key[1], clues) is not None]
+    return [key for key in dict.fromkeys(accepted) if may_grow(current.model.problem.drive, key, clues)]
+
+
+def may_grow(drive: Drive, key: Key, clues: Clues) -> bool:
+    """Whether an effect that a drive has may have a more general shape there."""
+    effect, place = key
+    return effects()[effect].reshaped(drive, place, clues) is not None
 
 
 def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
