@@ -12,7 +12,7 @@ from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.options import AT, considered

@@ -10,19 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import (
-    UNIMPORTANT,
-    FittedModel,
-    begun,
-    fit_base,
-    nudged,
-)
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
+from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun
+from friction_ocp.diagnosis.refit import nudged
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive

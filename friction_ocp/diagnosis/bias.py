@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.simulation.grid import FloatArray

@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import Excess
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.options import Considered, places
 from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import effects

@@ -8,7 +8,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.mechanism import Mechanism, column

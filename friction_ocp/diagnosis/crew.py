@@ -11,8 +11,9 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.blocks import Blocks
-from friction_ocp.diagnosis.fitting import FittedModel, begun_at_size, completed, quick_refit
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.refit import begun_at_size, completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.worth import Key

@@ -11,7 +11,7 @@ from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import DOUBTED, Excess
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of

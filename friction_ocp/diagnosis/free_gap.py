@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import fitted_without, folds
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
 from friction_ocp.estimation.model import Model

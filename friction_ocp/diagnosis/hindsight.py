@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.select import Choice, Round
 from friction_ocp.diagnosis.worth import Key, samples
 

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects

@@ -9,9 +9,11 @@ import numpy as np
 
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.fitting import FittedModel, freed, polished, timed
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import training_pieces
+from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import released
+from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects

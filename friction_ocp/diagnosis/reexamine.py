@@ -13,9 +13,11 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, completed, polished, without_addition
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds, held_out
+from friction_ocp.diagnosis.polishing import UNIMPORTANT, polished
 from friction_ocp.diagnosis.reading import with_additions
+from friction_ocp.diagnosis.refit import completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import Key, may_grow, required

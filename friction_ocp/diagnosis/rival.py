@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray
 

@@ -10,12 +10,14 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import MOST_OF, UNIMPORTANT, freed, without_addition
 from friction_ocp.diagnosis.free_gap import carries_over, left_out_errors
 from friction_ocp.diagnosis.held_out import folds
+from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import NONE, Considered, places
+from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
+from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn

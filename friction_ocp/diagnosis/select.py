@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.excess import Excess
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.simulation.grid import FloatArray

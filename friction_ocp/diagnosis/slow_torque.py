@@ -15,7 +15,7 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, KinematicError, Shaft
 from friction_ocp.effects.effect import (
     Clues,

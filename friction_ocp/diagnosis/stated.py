@@ -10,9 +10,12 @@ import numpy as np
 from friction_ocp.diagnosis.bench import blocks_like
 from friction_ocp.diagnosis.blocks import Blocks, blocks_of, stats
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, freed, polished, quick_refit
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import Considered
+from friction_ocp.diagnosis.polishing import polished
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz

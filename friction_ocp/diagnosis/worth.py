@@ -10,7 +10,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import DOUBTED, Excess, excess
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened

@@ -9,9 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError

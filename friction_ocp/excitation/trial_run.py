@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.parts import Channel, Controller, Drive, Motor
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.drive.values import bind_drive

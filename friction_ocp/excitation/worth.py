@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.special as _special  # pyright: ignore[reportMissingTypeStubs]
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
 from friction_ocp.estimation.model import Model, prepare

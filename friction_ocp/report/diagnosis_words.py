@@ -43,7 +43,8 @@ def _cut_short(result: Json) -> str:
     """Say that there was more to try, and how to have it tried."""
     if not result.get("cut_short"):
         return ""
-    return " The search ended at its usual effort with more to try: `effort: 3` under `diagnosis:` lets it go on."
+    more = "a larger `effort` under `diagnosis:` (1 if none is stated) lets it go on"
+    return f" The search ended at its limit of effort with more to try: {more}."
 
 
 def _with_rivals(result: Json) -> list[str]:

@@ -11,10 +11,12 @@ import numpy as np
 
 from blind.judging import Pair
 from friction_ocp import FrictionOcpError, Problem
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, fit_base, quick_refit
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.estimation.model import prepare

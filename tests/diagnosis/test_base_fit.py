@@ -11,7 +11,7 @@ import pytest
 import yaml
 from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, write_case
 
-from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import change_shaft
 from friction_ocp.errors import FrictionOcpError

@@ -13,8 +13,9 @@ from friction_ocp.diagnosis.bench import Bench, Seat, bettered, open_bench
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.crew import Crew, held_out_costs
 from friction_ocp.diagnosis.easing import FAR
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive

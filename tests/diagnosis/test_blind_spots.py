@@ -10,10 +10,11 @@ import pytest
 from diagnosis_cases import axis, write_case
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blind_spots import CERTAIN, BlindSpot, blind_spots
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import Excess
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.options import Considered
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem

@@ -12,8 +12,9 @@ from plant import PlantFriction
 from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import FittedModel, completed, quick_refit
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.worth import samples
 from friction_ocp.effects.registry import effects

@@ -11,8 +11,8 @@ import yaml
 from diagnosis_cases import INERTIA, SECONDS, STEP, axis, write_case
 from plant import Plant, PlantAmplifier, PlantSensor, Trajectory, steps_and_multisine
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.diagnose import diagnose
-from friction_ocp.diagnosis.fitting import fit_base
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import late_of, prepare

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import completed, fit_base, quick_refit
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.registry import effects

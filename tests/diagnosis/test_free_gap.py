@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
 
-from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import BLOCKS, FreeErrors, carries_over, free_errors, gap_map
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem

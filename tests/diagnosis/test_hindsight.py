@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.hindsight import MIMICKED, doubted, merged, standing
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import NOTHING, Choice, Round

@@ -10,9 +10,10 @@ import pytest
 import yaml
 from diagnosis_cases import VISCOUS, axis, write_case
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import FittedModel, fit_base
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out, told
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system

@@ -14,9 +14,9 @@ from friction_ocp.diagnosis import reexamine
 from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import completed, quick_refit
 from friction_ocp.diagnosis.held_out import folds, held_out
 from friction_ocp.diagnosis.reexamine import exchanged
+from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.select import Round, choose

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.fitting import fit_base
 from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, significant, slow_torque_of, slow_torques
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
 
-from friction_ocp.diagnosis.fitting import UNIMPORTANT, FittedModel, fit_base, unstuck
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.kinks import unstuck
+from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.splicing import carried_on, spliced

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import COULOMB, axis, write_case
 
-from friction_ocp.diagnosis.fitting import fit_base
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.footing import FOLDS
 from friction_ocp.diagnosis.standstill import beside_jumps, settled
 from friction_ocp.estimation.model import prepare

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitting import fit_base
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 

@@ -10,7 +10,7 @@ import pytest
 
 from friction_ocp.diagnosis import worth
 from friction_ocp.diagnosis.excess import Excess
-from friction_ocp.diagnosis.fitting import FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.diagnosis.worth import Standard, with_resembling

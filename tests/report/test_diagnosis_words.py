@@ -84,5 +84,5 @@ def test_a_search_that_ended_early_says_so() -> None:
     """And how to have the rest tried; one that tried everything says nothing."""
     for accepted in ([], [COGGING]):
         said = diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=True))
-        assert said.endswith("`effort: 3` under `diagnosis:` lets it go on.")
+        assert said.endswith("a larger `effort` under `diagnosis:` (1 if none is stated) lets it go on.")
         assert "effort" not in diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=False))

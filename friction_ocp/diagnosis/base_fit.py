@@ -1,0 +1,103 @@
+"""The fit of the base model from its guesses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friction_ocp.diagnosis.easing import along, eased, finer
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.footing import Footing, footing
+from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.polishing import COARSE, WARM, polished, timed
+from friction_ocp.diagnosis.standstill import settled
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.fit import fit
+from friction_ocp.estimation.gauss_newton import solve_gauss_newton
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Absolute, Squares
+
+BLUNT = 0.2
+"""Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
+
+
+def fit_base(model: Model) -> FittedModel:
+    """Fit the base model from its guesses and lay the footing on which all models are compared.
+
+    Raises FrictionOcpError where no simulation of it holds.
+    """
+    fitted = _fitted_base(model)
+    if not fitted.holds:
+        where = f"{model.problem.path or model.problem.title}: diagnose"
+        what = "the simulation of the model as it stands breaks down along the recordings"
+        remedy = "start from other guesses or narrow the bounds"
+        raise FrictionOcpError(Finding(where, what, "a model that can be simulated", remedy))
+    return fitted
+
+
+def _fitted_base(model: Model) -> FittedModel:
+    rough = footing(model, model.space.guess)
+    if rough.segment_s is None and model.problem.estimation.loss == "squares":
+        return _free_base(model, rough)
+    if rough.segment_s is None:
+        fitted = fit(model)
+        theta = fitted.solution.point.theta
+        loss = fitted.program.loss
+        if isinstance(loss, Absolute):
+            loss = Absolute(BLUNT * mean_error(fitted.program, fitted.solution.point))
+        return polished(model, footing(model, theta, loss), theta, None)
+    program, end = _rough_answer(model)
+    foot = footing(model, end.theta)
+    exact = foot.program(model, program.experiments)
+    nodes = exact.point_along(program, end).nodes
+    started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
+    return freed(timed(_from_rest(_from_afar(started, [model.space.guess, end.theta]))))
+
+
+def _from_afar(fitted: FittedModel, starts: Sequence[FloatArray]) -> FittedModel:
+    """Fit again through wide gaps from some starts where the fit has missed much, on finer segments where needed."""
+    if not fitted.astray:
+        return fitted
+    program, point, factor = fitted.linear.program, fitted.linear.point, fitted.missed
+    foot, wide = finer(fitted.model, fitted.footing, starts, factor)
+    finely = foot.training(fitted.model)
+    begins = [along(finely, program, point), eased(finely, wide, factor)]
+    best = solve_gauss_newton(finely, min(begins, key=finely.objective), WARM).point
+    return FittedModel(fitted.model, foot, linear_program(finely, best))
+
+
+def _free_base(model: Model, rough: Footing) -> FittedModel:
+    """Fit free runs by squares from the guesses, and from where loosely joined segments lead; the better end counts."""
+    starts = [model.space.guess, _rough_answer(model)[1].theta]
+    best = min((_coarse(model, rough, theta) for theta in starts), key=lambda end: end.objective)
+    foot = footing(model, best.theta)
+    return freed(timed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes))))
+
+
+def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
+    program, theta = foot.training(model), model.space.clip(theta)
+    start = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    return polished(model, foot, theta, start.nodes, COARSE)
+
+
+def _from_rest(fitted: FittedModel) -> FittedModel:
+    """Fit again from recordings that start at rest, where that costs less."""
+    program, point = fitted.linear.program, fitted.linear.point
+    resting = settled(program, point)
+    if program.objective(resting) >= program.objective(point):
+        return fitted
+    return polished(fitted.model, fitted.footing, fitted.theta, resting.nodes)
+
+
+def _rough_answer(model: Model) -> tuple[Program, Point]:
+    """Fit on loosely joined segments, from the guesses and from short predictions."""
+    short = predictions(model, model.train, WIDTHS[0])
+    start = Point(model.space.guess, short.suggested_nodes(model.space.guess))
+    starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
+    program = relaxed(model, model.train, 0.0, Squares())
+    ends = [solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE) for theta in starts]
+    return program, min(ends, key=lambda end: end.objective).point

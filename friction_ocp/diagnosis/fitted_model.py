@@ -1,0 +1,78 @@
+"""A model at its best parameters on a footing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from friction_ocp.diagnosis.easing import FAR, missed
+from friction_ocp.diagnosis.footing import Footing
+from friction_ocp.diagnosis.linear import LinearProgram
+from friction_ocp.diagnosis.own_noise import with_own_noise
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.execution.effort import once
+from friction_ocp.simulation.grid import FloatArray
+
+STEPS_OF_NODES = 3
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A model at its best parameters on a footing."""
+
+    model: Model
+    footing: Footing
+    linear: LinearProgram
+
+    @property
+    def theta(self) -> FloatArray:
+        """(parameters,)."""
+        return self.linear.point.theta
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values by name."""
+        return dict(zip(self.model.space.names, map(float, self.theta), strict=True))
+
+    @property
+    def determined(self) -> int:
+        """The number of parameters that lie within their bounds, not at one."""
+        low, high = self.model.space.ends(self.theta)
+        return int(np.sum(~low & ~high))
+
+    @property
+    def objective(self) -> float:
+        """The cost of all residuals: half their sum of squares, or what the loss makes of them."""
+        return self.linear.program.objective(self.linear.point) + self._unseen
+
+    @property
+    def holds(self) -> bool:
+        """Whether the simulation does not break down."""
+        return bool(np.isfinite(self.objective))
+
+    @property
+    def missed(self) -> float:
+        """The power of the residuals over that of noise."""
+        return missed(self.linear.program, self.linear.point)
+
+    @property
+    def astray(self) -> bool:
+        """Whether something so large is missing that the parameters that the fit has found say little."""
+        return FAR < self.missed < np.inf
+
+    @cached_property
+    @once
+    def cost(self) -> float:
+        """The same with the noise that this model's own inertia would show: what models are compared by."""
+        program, wider = with_own_noise(self.linear.program, self.model, self.footing, self.theta)
+        point = solve_nodes(program, self.linear.point, STEPS_OF_NODES)
+        return program.objective(point) + float(sum(np.sum(part) for part in wider)) + self._unseen
+
+    @property
+    def _unseen(self) -> float:
+        """What samples that reading late channels earlier lost count for, lest losing them looks like a gain."""
+        program = self.linear.program
+        return sum(float(np.sum(program.lost_costs(k))) for k in range(len(program.experiments)))

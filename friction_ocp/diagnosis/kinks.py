@@ -1,0 +1,87 @@
+"""Ways out of the ends that the kinks of exact friction make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
+from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.polishing import (
+    COARSE,
+    MOST_TURNS,
+    NEGLIGIBLE,
+    UNIMPORTANT,
+    WARM,
+    begun,
+    joined,
+    worthwhile,
+)
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.splicing import spliced
+
+DETOURS = (0.02, 0.004, 0.0008, 0.00016)
+"""Smoothing of the sign over the typical speed on the way around kinks, and back step by step: in one step, nodes that
+wide smoothing has moved are caught at kinks that are not theirs."""
+HARDLY = (0.0005, 0.0002)
+"""The same for the nodes alone: an accelerometer sees every change of the sign, and wide smoothing leads astray."""
+NODE_STEPS = 8
+
+
+def freed(fitted: FittedModel) -> FittedModel:
+    """Go on through friction with a smoothed sign, and back; keep what came in where that leads to nothing better.
+
+    A shaft that sticks in the model and slides in truth, or the reverse, is an end whose derivatives show nothing: it
+    stays there whatever the parameters are, and looks like a torque that the model lacks.
+    """
+    if not fitted.theta.size:
+        return fitted
+    program, point = fitted.linear.program, fitted.linear.point
+    beyond = around_kinks(fitted.model, program, point, WARM)
+    best = beyond.point if beyond.objective < fitted.objective else point
+    best = unstuck(fitted.model, program, best)
+    return fitted if best is point else replace(fitted, linear=linear_program(program, best))
+
+
+def unstuck(model: Model, program: Program, point: Point) -> Point:
+    """Return where fresh nodes, or those that friction with a hardly smoothed sign leads to, lead on to in turn."""
+    ways: list[Callable[[Program, Point], Point]] = [_fresh, *(partial(_rounded, model, width) for width in HARDLY)]
+    idle, cost = 0, program.objective(point)
+    for turn in range(MOST_TURNS * len(ways)):
+        moved = _with_better(program, point, ways[turn % len(ways)](program, point))
+        enough, before = worthwhile(program, cost), cost
+        if moved is not point:
+            end = solve_gauss_newton(program, moved, WARM)
+            point, cost = end.point, end.objective
+        idle = idle + 1 if before - cost < enough else 1
+        if idle == len(ways):
+            break
+    return point
+
+
+def _fresh(program: Program, point: Point) -> Point:
+    return begun(program, point.theta)
+
+
+def _rounded(model: Model, width: float, program: Program, point: Point) -> Point:
+    """Return the point with nodes that friction with a hardly smoothed sign leads to."""
+    rounded = replace(program, width=width * model.speed_scale)
+    return solve_nodes(program, solve_nodes(rounded, point, NODE_STEPS, NEGLIGIBLE), NODE_STEPS, NEGLIGIBLE)
+
+
+def _with_better(program: Program, point: Point, other: Point) -> Point:
+    """Return the point with the better stretches of nodes of another, where that is worth a step."""
+    trial = joined(program, solve_nodes(program, spliced(program, point, other), STEPS_OF_NODES, NEGLIGIBLE))
+    return trial if program.objective(trial) < program.objective(point) - UNIMPORTANT else point
+
+
+def around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:
+    """Solve again from where friction with a smoothed sign leads to, less and less of it."""
+    for width in DETOURS:
+        rounded = replace(program, width=width * model.speed_scale)
+        point = solve_gauss_newton(rounded, point, COARSE).point
+    return solve_gauss_newton(program, point, limits)

@@ -1,0 +1,115 @@
+"""Fits that begin at the answer of another model: of a candidate, of the same again, of what is left of additions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from friction_ocp.diagnosis.contrast import Contrast, contrast
+from friction_ocp.diagnosis.easing import eased
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.polishing import QUICK, polished, timed
+from friction_ocp.diagnosis.screen import Screened, Start
+from friction_ocp.drive.parts import Drive
+from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.program import Point, Program
+
+SIZES = (1.0, 0.3, 3.0, 10.0)
+"""Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
+MOST_OF = 0.5
+"""Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
+NUDGE, CLOSE_BY = 0.05, 1.2
+"""Relative change of the parameters from which a fit begins again, and its objective after a few steps over the known
+one up to which it goes on."""
+
+
+def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
+    """Fit a candidate, a few steps from each of the starts that the score test predicts.
+
+    The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
+    Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
+    where most of that stays, steps begin at a large effect, too.
+    """
+    drive = item.augmentation.drive
+    model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
+    program = base.footing.training(model)
+    points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
+    ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
+    best = min(end.objective for end in ends)
+    if base.astray and base.footing.segment_s is not None and base.objective - best < item.gain:
+        away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
+        far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
+        ends += [timed(end, QUICK) for end in far]
+    large, best = item.augmentation.large, min(end.objective for end in ends)
+    if base.astray and large is not None and base.objective - best < MOST_OF * base.objective:
+        tried = [large(start.added(item.augmentation.off)) for start in item.starts]
+        ends += [
+            _steps(base, model, program, _point(base, model, built, {**base.values, **values})) for values in tried
+        ]
+    return min(ends, key=lambda fitted: fitted.objective)
+
+
+def begun_at_size(base: FittedModel, item: Screened, scale: float) -> FittedModel:
+    """Fit a candidate, a few steps from a multiple of its predicted size, all else as it was."""
+    drive = item.augmentation.drive
+    model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
+    values = base.values | item.starts[0].added(item.augmentation.off, scale)
+    return _steps(base, model, base.footing.training(model), _point(base, model, built, values))
+
+
+def _launches(
+    base: FittedModel, item: Screened, start: Start, model: Model, built: Contrast, program: Program
+) -> list[Point]:
+    """Return the point at the predicted size, and the one at the size that comes closest where that is another."""
+    off = item.augmentation.off
+    points = [_point(base, model, built, start.values(off, base.values, scale)) for scale in SIZES]
+    closest = min(range(len(points)), key=lambda k: program.objective(points[k]))
+    return [points[k] for k in sorted({0, closest})]
+
+
+def _point(base: FittedModel, model: Model, built: Contrast, values: Mapping[str, float]) -> Point:
+    wanted = dict(zip(built.space.names, built.theta(values), strict=True))
+    theta = model.space.clip(np.array([wanted[name] for name in model.space.names]))
+    known = dict(zip(model.space.names, theta, strict=True))
+    at = np.array([known[name] for name in built.space.names])
+    tracks = built.simulate([(k, at) for k in range(len(base.linear.recordings))])
+    return Point(theta, tuple(track.nodes for track in tracks))
+
+
+def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:
+    finite = np.isfinite(program.objective(point))
+    return polished(model, base.footing, point.theta, point.nodes if finite else None, QUICK)
+
+
+def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
+    """Continue a refit to its end, around the kinks of exact friction that catch it.
+
+    One of segments that is still far from the recordings there lacks more than better nodes give back: unless the refit
+    is to be `thorough` it is not freed until it is accepted, which most of those are not.
+    """
+    ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
+    enough = ended.astray and fitted.footing.segment_s is not None and not thorough
+    return ended if enough else freed(ended)
+
+
+def nudged(fitted: FittedModel, seed: int) -> FittedModel:
+    """Fit again from parameters that chance has changed a little.
+
+    Exact friction has kinks, and between them many ends: an answer that is not the best one leaves a torque that no
+    effect explains.
+    """
+    rng = np.random.default_rng(seed)
+    theta = fitted.theta * (1.0 + NUDGE * rng.standard_normal(fitted.theta.size))
+    end = polished(fitted.model, fitted.footing, theta, None, QUICK)
+    if not end.objective < CLOSE_BY * fitted.objective:
+        return end
+    return freed(polished(end.model, end.footing, end.theta, end.linear.point.nodes))
+
+
+def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
+    """Fit a drive that lacks something that the current model has."""
+    model = with_drive(current.model, drive)
+    fitted = timed(polished(model, current.footing, model.space.with_known(current.values), None))
+    return fitted if fitted.astray and not current.astray else freed(fitted)
