@@ -68,9 +68,9 @@ def detect_resolution(values: npt.ArrayLike) -> float | None:
 def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     """Tell whether the signal runs into its highest or lowest value and stays there, while it moves otherwise.
 
-    Only runs of equal extremes count that are longer than runs elsewhere and are reached or left in full motion, four
-    levels of a quantised signal within five samples: neither a rest nor the flat top of a quantised sine is. But a
-    commanded plateau looks the same as clipping.
+    Only runs of equal extremes count that are longer than runs elsewhere and are reached and left in full motion, four
+    levels of a quantised signal within five samples: neither is the flat top of a quantised sine, nor a rest, which
+    friction may end with a jump. But a commanded plateau looks the same as clipping.
     """
     y = np.asarray(values, dtype=np.float64)
     y = y[np.isfinite(y)]
@@ -87,14 +87,16 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
         reach: float(np.median(np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]))
         for reach in range(2, 6)
     }
-    stuck = 0
+    stuck, ways = 0, np.zeros(2, dtype=bool)
     for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
         reach = min(max((stop - start) // 2, 2), 5)
         # A parabola reached and left with slope s is s n / 4 high over n samples; a quantised one stays within levels.
-        height = float(np.mean(_moves(y, start, stop, 2))) / 2.0 * (stop - start) / 4.0
-        if max(_moves(y, start, stop, reach)) > max(0.25 * usual[reach], coarse) and height > coarse:
+        height = float(np.nanmean(_moves(y, start, stop, 2))) / 2.0 * (stop - start) / 4.0
+        fast = _moves(y, start, stop, reach) > max(0.25 * usual[reach], coarse)
+        if np.any(fast) and height > coarse:
             stuck += stop - start
-    return stuck >= min_share * len(y)
+            ways |= fast | np.array([start == 0, stop == len(y)])
+    return stuck >= min_share * len(y) and bool(np.all(ways))
 
 
 def without_low_pass(time: npt.ArrayLike, values: npt.ArrayLike, time_constant: float) -> FloatArray:
@@ -189,10 +191,10 @@ def plateaus(values: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.i
     return starts[there], stops[there]
 
 
-def _moves(y: FloatArray, start: int, stop: int, reach: int) -> list[float]:
-    """Return how far the signal is from the value of a run, `reach` samples before and after it."""
-    places = [place for place in (start - reach, stop - 1 + reach) if 0 <= place < len(y)]
-    return [abs(float(y[place] - y[start])) for place in places] or [0.0]
+def _moves(y: FloatArray, start: int, stop: int, reach: int) -> FloatArray:
+    """Return (2,) how far the signal is from the value of a run `reach` samples before and after it; NaN is outside."""
+    places = (start - reach, stop - 1 + reach)
+    return np.array([abs(float(y[place] - y[start])) if 0 <= place < len(y) else np.nan for place in places])
 
 
 def _reinsch(t: FloatArray, y: FloatArray, penalty: float) -> FloatArray:

@@ -142,6 +142,10 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 1, "max": 0}),
         "drive.shafts[0].friction.tau_c: min = 1 N m is above max = 0 N m; min below max; swap them",
     ),
+    "bounds that both are elsewhere": (
+        put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 1, "max": 0.5}),
+        "drive.shafts[0].friction.tau_c: min = 1 N m is above max = 0.5 N m; min below max; correct one of them",
+    ),
     "guess outside": (
         put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 0.06, "max": 1}),
         "drive.shafts[0].friction.tau_c: guess = 0.05 N m is outside its bounds; 0.06 N m to 1 N m; move",
@@ -260,7 +264,8 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
     ),
     "unknown signal": (
         put("channels/position/measures", "load.angle"),
-        "channels.position.measures: 'load' has no signal 'angle'; available: load.theta, load.omega, load.alpha",
+        "channels.position.measures: 'load' has no signal 'angle'; available: load.theta, load.omega, load.alpha, "
+        "load.drive_torque; did you mean 'load.theta'?",
     ),
     "reference as output": (
         put("channels/goal", {"measures": "reference.theta", "role": "output"}),

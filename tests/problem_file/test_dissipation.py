@@ -137,3 +137,12 @@ def test_a_loop_and_a_line_through_zero_exclude_each_other(workshop: Workshop) -
     friction = {"law": "polyline_hysteresis", "polyline": polyline, "width": 1e-3}
     path = workshop.problem(lambda content: content["drive"]["shafts"][0].update(friction=friction))
     assert any("exclude each other" in message for message in workshop.messages(path))
+
+
+def test_a_fitted_lugre_law_is_doubted_at_its_guesses(workshop: Workshop) -> None:
+    """A warning about numbers that the fit may change says so."""
+    numbers = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100, "sigma1": 1, "sigma2": 0.4}
+    (known,) = warnings(workshop, numbers)
+    (fitted,) = warnings(workshop, {**numbers, "sigma1": {"guess": 1, "min": 0, "max": 10}})
+    assert "at the guesses" not in known
+    assert "= 0.5 at the guesses" in fitted

@@ -142,6 +142,15 @@ def test_motion_that_rests_or_turns_is_not_clipped(rng: np.random.Generator) -> 
     assert not is_clipped(np.ones(N))
 
 
+def test_rest_that_friction_ends_with_a_jump_is_not_clipped() -> None:
+    """An axis that friction holds where it has turned, and that breaks away at once, is not at the end of its range."""
+    stroke = -np.cos(np.linspace(0.0, np.pi, 400))
+    held, leaving = np.full(100, stroke[-1]), stroke[::-1][60:]
+    seen = np.concatenate([stroke, held, leaving] * 3)
+    assert not is_clipped(seen)
+    assert not is_clipped(np.round(seen * 2000.0) / 2000.0)
+
+
 def test_smooth_motion_of_a_line_is_exact(rng: np.random.Generator) -> None:
     """A line is its own smoothing spline at any cutoff: exact speed, no acceleration."""
     time = times(rng)

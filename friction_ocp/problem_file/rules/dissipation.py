@@ -11,6 +11,7 @@ from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.gms import GeneralizedMaxwellSlip
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction
+from friction_ocp.parameters import Free
 from friction_ocp.problem_file.rules.case import Case, Rule
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.recording import FloatArray
@@ -22,7 +23,7 @@ _DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
 
 def friction_opposes_motion(case: Case) -> Iterator[Finding]:
     """Friction that pushes is doubtful: its magnitude is not negative."""
-    for where, unit, law in _laws(case):
+    for where, unit, law, _ in _laws(case):
         with np.errstate(all="ignore"):
             magnitude = np.asarray(law.magnitude(SPEEDS), dtype=np.float64)
         wrong = magnitude < 0.0
@@ -35,7 +36,7 @@ def friction_opposes_motion(case: Case) -> Iterator[Finding]:
 
 def bristles_are_passive(case: Case) -> Iterator[Finding]:
     """A LuGre model that can give energy back is doubtful. Source: Barahanov & Ortega 2000."""
-    for where, unit, law in _laws(case):
+    for where, unit, law, guessed in _laws(case):
         if not isinstance(law, LuGre):
             continue
         tau_c, tau_s, sigma1, sigma2 = law.tau_c, law.tau_s, law.sigma1, law.sigma2
@@ -43,11 +44,13 @@ def bristles_are_passive(case: Case) -> Iterator[Finding]:
         if sigma1 > 0 and sigma2 <= limit and tau_s > tau_c:
             wrong = _margin(law, SPEEDS) < 0.0
             holds = _range(wrong, lambda speed, law=law: float(_margin(law, np.array([speed]))[0]) >= 0.0, unit)
-            what = f"sigma2 = {sigma2:g} is not above sigma1 (tau_s - tau_c)/tau_c = {limit:g}"
+            at = " at the guesses" if guessed else ""
+            what = f"sigma2 = {sigma2:g} is not above sigma1 (tau_s - tau_c)/tau_c = {limit:g}{at}"
             allowed = (
                 f"a LuGre model with sigma2 > sigma1 (tau_s - tau_c)/tau_c is passive at all speeds, this one {holds}"
             )
-            yield Finding(where, what, allowed, "lower sigma1, or keep to these speeds", severity="warning")
+            remedy = "guess a lower sigma1, or state that as a constraint" if guessed else "lower sigma1"
+            yield Finding(where, what, allowed, f"{remedy}, or keep to these speeds", severity="warning")
 
 
 def _margin(law: LuGre, speed: FloatArray) -> FloatArray:
@@ -79,7 +82,7 @@ def _range(wrong: np.ndarray, holds: Callable[[float], bool], unit: str) -> str:
 
 def maxwell_shares_add_up(case: Case) -> Iterator[Finding]:
     """The elements of a Maxwell-slip law share its level: not negative, and all of it."""
-    for where, _, law in _laws(case):
+    for where, _, law, _ in _laws(case):
         if not isinstance(law, GeneralizedMaxwellSlip):
             continue
         shares = [float(item.share) for item in law.elements]
@@ -100,12 +103,14 @@ def hysteresis_has_a_jump(case: Case) -> Iterator[Finding]:
             yield Finding(where, "the loop and the line through zero exclude each other", remedy="remove omega_zero")
 
 
-def _laws(case: Case) -> Iterator[tuple[str, str, AbstractFrictionLaw]]:
-    """Yield the place, the unit of speed and the law of every shaft, once for each direction that differs."""
+def _laws(case: Case) -> Iterator[tuple[str, str, AbstractFrictionLaw, bool]]:
+    """Yield of every shaft, once for each direction that differs: place, unit of speed, law, whether it is guessed."""
     for k, shaft in enumerate(case.bound.shafts):
         element: FrictionElement = shaft.friction
+        own = (leaf.value for path, leaf in case.leaves.items() if path.startswith(f"{shaft.name}.friction."))
+        guessed = any(isinstance(value, Free) for value in own)
         for law in dict.fromkeys(element.law.along(direction) for direction in _DIRECTIONS):
-            yield case.at(f"drive.shafts[{k}].friction"), si_unit("speed", shaft.motion), law
+            yield case.at(f"drive.shafts[{k}].friction"), si_unit("speed", shaft.motion), law, guessed
 
 
 DISSIPATION: tuple[Rule, ...] = (

@@ -17,6 +17,8 @@ DRIVING_SIGNALS = ("torque", "current", "voltage")
 """Signals of a motor that make it turn when they are inputs."""
 _PREDICTED = {"theta", "omega", "alpha", "torque", "current", "voltage", DRIVE_TORQUE}
 _REFERENCE_OF = {"duty": "theta", "p": "theta", "pd": "theta", "cascade": "theta", "pi_velocity": "omega"}
+_OTHER_WORDS = {"position": "theta", "angle": "theta", "velocity": "omega", "speed": "omega", "acceleration": "alpha"}
+"""What signals are called elsewhere."""
 
 
 def channels_measure_what_exists(case: Case) -> Iterator[Finding]:
@@ -31,6 +33,7 @@ def channels_measure_what_exists(case: Case) -> Iterator[Finding]:
         if own:
             what = f"'{channel.part}' has no signal '{channel.signal}'"
             meant = [f"{motor.name}.{channel.signal}" for motor in case.drive.motors if motor.shaft == channel.part]
+            meant.append(f"{channel.part}.{_OTHER_WORDS.get(channel.signal, '')}")
             turned = [f"did you mean '{name}'?" for name in meant if name in signals]
             remedy = turned[0] if turned else closest(channel.measures, own)
             yield Finding(where, what, f"available: {', '.join(own)}", remedy)
@@ -48,8 +51,11 @@ def available_signals(drive: Drive) -> list[str]:
 
 def roles_fit_signals(case: Case) -> Iterator[Finding]:
     """Set points, supply and enable are given to the drive; an acceleration cannot be imposed on it."""
+    existing = available_signals(case.drive)
     for channel in case.drive.channels:
         where = case.at(f"channels.{channel.name}.role")
+        if channel.measures not in existing:
+            continue
         if channel.role == "output" and (channel.part == "reference" or channel.signal not in _PREDICTED):
             yield Finding(where, f"nothing predicts {channel.measures}", "role: input", "state role: input")
         if channel.role == "input" and channel.signal == "alpha":

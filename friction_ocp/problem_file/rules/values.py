@@ -29,7 +29,9 @@ def bounds_are_in_order(case: Case) -> Iterator[Finding]:
         if value.min >= value.max:
             low, high = quantity_text(value.min, unit), quantity_text(value.max, unit)
             swapped = "is above" if value.min > value.max else "equals"
-            remedy = "swap them" if value.min > value.max else "write a plain number to keep it fixed"
+            remedy = "write a plain number to keep it fixed"
+            if value.min > value.max:
+                remedy = "swap them" if value.max <= value.guess <= value.min else "correct one of them"
             yield Finding(case.at(case.place(path)), f"min = {low} {swapped} max = {high}", "min below max", remedy)
 
 
