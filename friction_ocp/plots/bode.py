@@ -8,7 +8,7 @@ import numpy as np
 
 from friction_ocp.plots.palette import colour
 from friction_ocp.plots.series import FloatArray
-from friction_ocp.plots.style import Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Figure, axes_grid, new_figure, plain_log_ticks
 
 Responses = Mapping[str, "np.ndarray[tuple[int], np.dtype[np.complex128]]"]
 
@@ -23,7 +23,7 @@ def bode_figure(frequency: FloatArray, responses: Responses, title: str, unit: s
         degrees = np.degrees(np.unwrap(np.angle(response)))
         phase.semilogx(frequency, degrees, color=colour(k), linewidth=1.6)
     for axis in (size.xaxis, size.yaxis, phase.xaxis):
-        axis.set_major_formatter("{x:g}")
+        plain_log_ticks(axis)
     size.set_title(title)
     size.set_ylabel(f"magnitude in {unit}")
     size.legend()

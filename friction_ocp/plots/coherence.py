@@ -7,7 +7,7 @@ from typing import Any
 
 from friction_ocp.plots.numbers import percent
 from friction_ocp.plots.palette import SIMULATED
-from friction_ocp.plots.style import WIDTH, Figure, axes_grid, new_figure
+from friction_ocp.plots.style import WIDTH, Figure, axes_grid, new_figure, plain_log_ticks
 
 
 def coherence_figure(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Figure:
@@ -21,7 +21,7 @@ def coherence_figure(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Fi
             if channel in by_channel:
                 share = by_channel[channel]
                 axes.semilogx(share["frequency_hz"], share["share"], color=SIMULATED)
-                axes.xaxis.set_major_formatter("{x:g}")
+                plain_log_ticks(axes.xaxis)
                 text = f"{percent(share.get('explained'))} of the power"
                 axes.text(0.01, 0.03, text, transform=axes.transAxes, fontsize=9)
             axes.set_ylim(-0.02, 1.05)

@@ -11,7 +11,7 @@ from friction_ocp.plots.numbers import unit_text
 from friction_ocp.plots.palette import GRID, MEASURED, MUTED, RESIDUAL, SIMULATED
 from friction_ocp.plots.reading import Json, part, rows
 from friction_ocp.plots.series import Series
-from friction_ocp.plots.style import Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Figure, axes_grid, new_figure, plain_log_ticks
 
 SHOWN = 8
 """Candidates in the ranking."""
@@ -54,7 +54,7 @@ def gap_map_figure(cells: Sequence[Json], changed: bool) -> Figure:
     axes.set_yticks(np.arange(len(labels)), names)
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
+    plain_log_ticks(axes.xaxis)
     axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
     axes.set_title("Where the gap is" if changed else "Where the free run is off")
     if changed:

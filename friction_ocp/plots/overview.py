@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.plots.numbers import is_number, to_resolution, unit_text
 from friction_ocp.plots.palette import MUTED, VERDICT_WORDS, VERDICTS
 from friction_ocp.plots.reading import rows
-from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure, plain_log_ticks
 
 _MARKERS = {"ok": "o", "at_bound": "s", "traded": "D", "not_identifiable": "X"}
 _LOG_BEYOND = 5.0  # largest over smallest ratio that a linear axis shows well
@@ -36,11 +36,11 @@ def overview_figure(parameters: Mapping[str, Mapping[str, Any]]) -> Figure:
     low, high = _limits(lines)
     if low > 0 and high / low > _LOG_BEYOND:
         axes.set_xscale("log")
-        axes.xaxis.set_major_formatter("{x:g}")
-        low, high = low / 1.6, high * 1.6
+        axes.set_xlim(low / 1.6, high * 1.6)
+        plain_log_ticks(axes.xaxis)
     else:
-        low, high = low - 0.12 * (high - low), high + 0.12 * (high - low)
-    axes.set_xlim(low, high)
+        axes.set_xlim(low - 0.12 * (high - low), high + 0.12 * (high - low))
+    low, high = axes.get_xlim()
     axes.axvline(1.0, color=MUTED, linewidth=1.2)
     for index, row in enumerate(lines):
         _draw(axes, index, row, (low, high))

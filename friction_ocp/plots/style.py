@@ -18,6 +18,8 @@ Figure: TypeAlias = Any
 
 WIDTH = 8.0
 """Inches."""
+FEW_DECADES = 300.0
+"""Ratio of the ends of a logarithmic axis below which decades alone are too few labels."""
 
 _RC: dict[str, Any] = {
     "axes.axisbelow": True,
@@ -79,6 +81,17 @@ def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> li
     """Return axes by row and column; `options` go to `Figure.subplots`."""
     grid = figure.subplots(rows, columns, squeeze=False, **options)
     return [list(row) for row in grid]
+
+
+def plain_log_ticks(axis: Any) -> None:
+    """Label a logarithmic axis, its limits set, with plain numbers: decades, and 2 and 5 where those are few."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    few = high < FEW_DECADES * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
