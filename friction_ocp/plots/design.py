@@ -11,7 +11,7 @@ from friction_ocp.plots.numbers import unit_text
 from friction_ocp.plots.palette import MEASURED, SIMULATED
 from friction_ocp.plots.reading import Json, part, rows
 from friction_ocp.plots.series import Series
-from friction_ocp.plots.style import Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Figure, axes_grid, headline, new_figure
 
 MEANING = {
     "D": "gain in the logarithm of the determinant of the information",
@@ -49,7 +49,7 @@ def excitation_figure(motion: str, channels: Mapping[str, Any], units: Mapping[s
     """Draw the channels of a motion as the model expects them."""
     figure = new_figure(0.6 + 1.8 * len(channels))
     title = f"{motion.replace('_', ' ')}: what the model expects"
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=12)
+    headline(figure, title)
     grid = axes_grid(figure, len(channels), sharex=True)
     for axes, (name, channel) in zip((row[0] for row in grid), channels.items(), strict=True):
         axes.plot(channel["time"], channel["simulated"], color=SIMULATED, linewidth=0.9)

@@ -11,10 +11,12 @@ from friction_ocp.plots.numbers import unit_text
 from friction_ocp.plots.palette import GRID, MEASURED, MUTED, RESIDUAL, SIMULATED
 from friction_ocp.plots.reading import Json, part, rows
 from friction_ocp.plots.series import Series
-from friction_ocp.plots.style import Figure, axes_grid, new_figure, plain_log_ticks
+from friction_ocp.plots.style import Figure, axes_grid, headline, new_figure, plain_log_ticks
 
 SHOWN = 8
 """Candidates in the ranking."""
+AROUND_NOISE = 2.0
+"""Factor about the noise floor that is in sight at least: chance makes regimes differ by a few percent."""
 GAINS = (
     ("predicted_gain", "predicted", GRID),
     ("refit_gain", "refitted", SIMULATED),
@@ -54,9 +56,11 @@ def gap_map_figure(cells: Sequence[Json], changed: bool) -> Figure:
     axes.set_yticks(np.arange(len(labels)), names)
     axes.axvline(1.0, color=MUTED, linewidth=1.0)
     axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, 1.0 / AROUND_NOISE), max(high, AROUND_NOISE))
     plain_log_ticks(axes.xaxis)
     axes.set_xlabel("rms error of the free run over the noise floor (line: the floor)")
-    axes.set_title("Where the gap is" if changed else "Where the free run is off")
+    headline(figure, "Where the gap is" if changed else "Where the free run is off")
     if changed:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     axes.invert_yaxis()
@@ -97,7 +101,7 @@ def ranking_figure(number: int, causes: Sequence[Json]) -> Figure:
     names = [f"{str(cause['effect']).replace('_', ' ')} at {cause['component']}" for cause in causes]
     axes.set_yticks(places, names)
     axes.set_xlabel("share of the excess error that the candidate takes away, in %")
-    axes.set_title(f"What competes, round {number}")
+    headline(figure, f"What competes, round {number}")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     axes.axvline(0.0, color=MUTED, linewidth=1.0)
     axes.invert_yaxis()
@@ -109,7 +113,7 @@ def before_after_figure(
 ) -> Figure:
     """Draw the residuals of every channel before and, where there are any, after the additions."""
     figure = new_figure(0.6 + 2.2 * len(before))
-    figure.suptitle(f"{recording}: residuals of the free run", x=0.01, ha="left", fontweight="bold", fontsize=12)
+    headline(figure, f"{recording}: residuals of the free run")
     grid = axes_grid(figure, len(before), sharex=True)
     for axes, (name, channel) in zip((row[0] for row in grid), before.items(), strict=True):
         curves = [("before", channel, RESIDUAL)] + ([("after", after[name], MEASURED)] if after is not None else [])

@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.plots.numbers import unit_text
 from friction_ocp.plots.palette import MEASURED, MUTED, NEGATIVE, POSITIVE, SIMULATED
 from friction_ocp.plots.reading import Json, rows
-from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Axes, Figure, axes_grid, headline, new_figure
 
 _COLUMNS, _PANEL_HEIGHT, _WIDTH = 2, 1.9, 10.0
 _PER_FIGURE = 20
@@ -35,7 +35,7 @@ def parameter_figure(parameter: str, series: Sequence[Json], dated: bool) -> Fig
     lines = -(-len(series) // _COLUMNS)
     figure = new_figure(0.9 + _PANEL_HEIGHT * lines, _WIDTH)
     unit = unit_text(str(series[0]["unit"]))
-    figure.suptitle(f"{parameter}{f' in {unit}' if unit else ''}", x=0.01, ha="left", fontweight="bold", fontsize=12)
+    headline(figure, f"{parameter}{f' in {unit}' if unit else ''}")
     axes = [one for row in axes_grid(figure, lines, _COLUMNS, sharex=True) for one in row]
     for one in axes[len(series) :]:
         one.set_visible(False)

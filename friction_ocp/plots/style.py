@@ -83,6 +83,11 @@ def axes_grid(figure: Figure, rows: int, columns: int = 1, **options: Any) -> li
     return [list(row) for row in grid]
 
 
+def headline(figure: Figure, text: str) -> None:
+    """Write what a figure shows above all of it, at its left edge."""
+    figure.suptitle(text, x=0.01, ha="left", fontweight="bold", fontsize=12)
+
+
 def plain_log_ticks(axis: Any) -> None:
     """Label a logarithmic axis, its limits set, with plain numbers: decades, and 2 and 5 where those are few."""
     from matplotlib.ticker import LogLocator, NullFormatter

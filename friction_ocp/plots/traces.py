@@ -9,14 +9,14 @@ import numpy as np
 from friction_ocp.plots.numbers import significant, unit_text
 from friction_ocp.plots.palette import GRID, MEASURED, MUTED, RESIDUAL, SIMULATED
 from friction_ocp.plots.series import ChannelColumns, Trace, traces_of
-from friction_ocp.plots.style import Axes, Figure, axes_grid, new_figure
+from friction_ocp.plots.style import Axes, Figure, axes_grid, headline, new_figure
 
 
 def traces_figure(recording: str, channels: Mapping[str, ChannelColumns], units: Mapping[str, str]) -> Figure:
     """Draw two axes a channel, all on one time axis."""
     traces = dict(traces_of(channels))
     figure = new_figure(0.6 + 3.4 * max(1, len(traces)))
-    figure.suptitle(recording, x=0.01, ha="left", fontweight="bold", fontsize=12)
+    headline(figure, recording)
     if not traces:
         return figure
     grid = axes_grid(figure, 2 * len(traces), sharex=True, height_ratios=[2.4, 1.0] * len(traces))
