@@ -14,6 +14,9 @@ from friction_ocp.diagnosis.worth import Key, samples
 MIMICKED = 0.01
 """Probability that what leaves nothing stands in for something outside the catalogue: it did in 2 of the 191 cases of
 the blind suites of seeds 20261125 to 20261127 where a cause was named and noise was left."""
+MISSED = 0.1
+"""Probability that a refit which came to rest on the way is the cause after all, where nothing explains what is left:
+1 of the 9 cases of the blind suite of seed 20261130 where nothing was named and more than noise was left."""
 ABSCISSAE = 64
 """At which the loss of normal noise is averaged (Gauss-Hermite quadrature)."""
 
@@ -42,8 +45,18 @@ def doubted(rounds: Sequence[Round], final: FittedModel, left_over: bool, lost: 
     Where nothing explains what is left, an addition may be no more than what comes nearest to one unknown cause of
     both: it is doubted by as large a share as what is left has in it and the addition together. `lost` is the share of
     the gap that is left on recordings that took no part, where nothing is left on the others.
+
+    Where nothing was added, and more than noise is left, candidates that were refitted share what is then doubted of
+    the catalogue's not having the cause, by what their refits gained.
     """
-    return [item if item.accepted is None else _doubted(item, final, left_over, lost) for item in rounds]
+    found = list[Round]()
+    for item in rounds:
+        if item.accepted is not None:
+            item = _doubted(item, final, left_over, lost)
+        elif left_over:
+            item = replace(item, choice=_less_final(item))
+        found.append(item)
+    return found
 
 
 def _doubted(item: Round, final: FittedModel, left_over: bool, lost: float) -> Round:
@@ -52,6 +65,18 @@ def _doubted(item: Round, final: FittedModel, left_over: bool, lost: float) -> R
     taken = max(item.before.objective - item.accepted.standing.objective, 0.0)
     share = left / (left + taken) if left > 0.0 else lost
     return replace(item, choice=_less_sure(item.choice, min(max(share, MIMICKED), 1.0 - MIMICKED)))
+
+
+def _less_final(item: Round) -> Choice:
+    """Return the choice of a round that found nothing whose rivals have a share of the probability of none."""
+    choice = item.choice
+    gains = [max(item.before.objective - rival.standing.objective, 0.0) for rival in choice.rivals]
+    whole = sum(gains)
+    if not whole > 0.0:
+        return choice
+    share = MISSED * choice.nothing
+    chances = tuple(known + share * gain / whole for known, gain in zip(choice.probabilities, gains, strict=True))
+    return replace(choice, probabilities=chances, nothing=choice.nothing - share)
 
 
 def _excess(fitted: FittedModel) -> float:

@@ -47,7 +47,7 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MOST_STEPS, MOST_RUNS = 1.3e9, 2500.0
+MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
 HOPE = 0.25
@@ -243,10 +243,12 @@ class Search:
         power = excess(current.linear.rows, blocks)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
         gap = power.significant(level) or (not accepted and significant(bench.slow, level))
-        chosen = with_resembling(
-            shortlist(hopeful, np.inf if gap else level / max(len(found), 1)), found, current.astray
-        )
         known = {item.key: item for item in found}
+        chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
+        if current.astray:
+            passed = [known[key] for key in self._passed_over(accepted) if key in known and known[key].starts]
+            chosen = [*chosen, *(item for item in passed if item not in chosen)]
+        chosen = with_resembling(chosen, found, current.astray)
         unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
@@ -261,6 +263,19 @@ class Search:
         shape = next((item for item in choice.aliases if item.key in again), None)
         best = (shape or choice.rivals[0]) if choice.significant else None
         return Round(tuple(found), choice, current, power, best)
+
+    def _passed_over(self, accepted: Sequence[Key]) -> list[Key]:
+        """Return what did most in the last round beside what that has added.
+
+        Of two large effects each does much alone, and the prediction says little beside the one as long as the other
+        is missing.
+        """
+        last = self.rounds[-1] if self.rounds else None
+        if last is None or last.accepted is None or last.accepted.key not in accepted:
+            return []
+        enough = last.before.cost - required(self.bench.base, last.before)
+        able = [item for item in last.choice.rivals if item.key not in accepted and item.standing.cost <= enough]
+        return [item.key for item in sorted(able, key=lambda item: item.standing.cost)[:FINISHED]]
 
 
 def _promising(found: Sequence[Screened]) -> list[Screened]:

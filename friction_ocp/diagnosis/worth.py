@@ -19,8 +19,11 @@ from friction_ocp.effects.effect import Clues
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import once
 
-REFITTED = 6
-"""Candidates that are refitted in a round."""
+REFITTED, MOST_REFITTED = 6, 9
+"""Different promises whose candidates are refitted in a round, and candidates at most."""
+SAME_PROMISE = 0.02
+"""Relative difference of predicted gains up to which they count as one promise: an effect at shafts that turn together,
+or a gain and an offset of one sensor, would crowd out what is different."""
 WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
 MATERIAL = 0.1
@@ -61,7 +64,19 @@ def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:
         return []
     worth = WORTH_REFITTING * significant[0].gain
     named = {item.effect for item in significant if item.gain >= worth}
-    return [item for item in found if item.effect in named and item.gain >= worth][:REFITTED]
+    return _different([item for item in found if item.effect in named and item.gain >= worth])
+
+
+def _different(found: Sequence[Screened]) -> list[Screened]:
+    """Return the first candidates, largest predicted gain first, as far as `REFITTED` different promises go."""
+    kept, promises, leader = list[Screened](), 0, np.inf
+    for item in found[:MOST_REFITTED]:
+        if item.gain < (1.0 - SAME_PROMISE) * leader:
+            promises, leader = promises + 1, item.gain
+        if promises > REFITTED:
+            break
+        kept.append(item)
+    return kept
 
 
 def with_resembling(chosen: Sequence[Screened], found: Sequence[Screened], astray: bool = False) -> list[Screened]:

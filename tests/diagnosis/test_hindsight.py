@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.hindsight import MIMICKED, doubted, merged, standing
+from friction_ocp.diagnosis.hindsight import MIMICKED, MISSED, doubted, merged, standing
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import NOTHING, Choice, Round
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Squares
@@ -53,6 +53,18 @@ def test_what_does_not_carry_over_is_doubted_by_what_is_left_elsewhere() -> None
     first, last = doubted(rounds, fitted(NOISE), False, 0.8)
     assert first.choice.nothing == pytest.approx(0.04 + 0.96 * 0.8)
     assert last is rounds[1]
+
+
+def test_refits_that_explain_nothing_may_have_come_to_rest_on_the_way() -> None:
+    """What nothing explains may be in the catalogue after all: by what the refits gained, if they gained anything."""
+    gained = [cast(Rival, SimpleNamespace(standing=fitted(NOISE + left))) for left in (100.0, 300.0, 500.0)]
+    choice = Choice(tuple(gained), (0.0, 0.0, 0.0), 1.0, False, ())
+    before = fitted(NOISE + 400.0)
+    (item,) = doubted([Round((), choice, before, cast(Any, None), None)], before, True, 0.0)
+    assert item.choice.probabilities == pytest.approx((0.75 * MISSED, 0.25 * MISSED, 0.0))
+    assert item.choice.nothing == pytest.approx(1.0 - MISSED)
+    (item,) = doubted([decided(None, NOISE + 400.0)], before, True, 0.0)
+    assert item.choice is NOTHING
 
 
 def test_rounds_whose_addition_was_taken_back_do_not_stand() -> None:
