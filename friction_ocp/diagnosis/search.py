@@ -110,6 +110,8 @@ class Search:
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
                 break
+            if self._exhausted():
+                break
         if self.accepted and not self._helps():
             self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
@@ -252,9 +254,6 @@ class Search:
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen = with_resembling(chosen, found, current.astray)
-        if current.astray:
-            passed = with_resembling([known[key] for key in self._passed_over(accepted) if key in known], found)
-            chosen = [*chosen, *(item for item in passed if item.starts and item not in chosen)]
         unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
@@ -269,19 +268,6 @@ class Search:
         shape = next((item for item in choice.aliases if item.key in again), None)
         best = (shape or choice.rivals[0]) if choice.significant else None
         return Round(tuple(found), choice, current, power, best)
-
-    def _passed_over(self, accepted: Sequence[Key]) -> list[Key]:
-        """Return what did most in the last round beside what that has added.
-
-        Of two large effects each does much alone, and the prediction says little beside the one as long as the other
-        is missing.
-        """
-        last = self.rounds[-1] if self.rounds else None
-        if last is None or last.accepted is None or last.accepted.key not in accepted:
-            return []
-        enough = last.before.cost - required(self.bench.base, last.before)
-        able = [item for item in last.choice.rivals if item.key not in accepted and item.standing.cost <= enough]
-        return [item.key for item in sorted(able, key=lambda item: item.standing.cost)[:FINISHED]]
 
 
 def _promising(found: Sequence[Screened]) -> list[Screened]:
