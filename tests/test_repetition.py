@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -224,3 +225,40 @@ def test_the_servo_is_the_same_again(tmp_path: Path) -> None:
     assert main(["identify", str(write_servo(tmp_path)), "--out", str(tmp_path / "out")]) == DONE
     status, found = rerun(tmp_path)
     assert (status, found["differences"], found["changed"]) == (DONE, [], [])
+
+
+def edited(folder: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    """Change what the first result of a folder says."""
+    path = folder / "out" / "result.json"
+    document = json.loads(path.read_text(encoding="utf-8"))
+    edit(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+
+
+def test_what_a_diagnosis_found_afterwards_is_compared(tmp_path: Path) -> None:
+    """The gap that is left differs, and so does what follows from it."""
+    command = ["diagnose", str(write_case(tmp_path, axis())), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(command) == DONE
+
+    def halve(document: dict[str, Any]) -> None:
+        for found in document["gap"]["after"].values():
+            found["rms"] *= 0.5
+
+    edited(tmp_path, halve)
+    status, found = rerun(tmp_path)
+    assert status == WRONG_INPUT
+    assert {item["where"] for item in found["differences"]} == {"gap.after.position.rms"}
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.005, DONE), (0.02, WRONG_INPUT)])
+def test_a_parameter_may_differ_by_a_share_of_its_standard_error(copied: Path, share: float, expected: int) -> None:
+    """That share is 1 %, whatever the tolerance of all other numbers is."""
+
+    def shift(document: dict[str, Any]) -> None:
+        inertia = document["parameters"]["motor.inertia"]
+        inertia["value"] += share * inertia["std_error"]
+
+    edited(copied, shift)
+    status, found = rerun(copied, "--tolerance", "1e-9")
+    places = [] if expected == DONE else ["parameters.motor.inertia.value"]
+    assert (status, [item["where"] for item in found["differences"]]) == (expected, places)
