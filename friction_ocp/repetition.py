@@ -55,6 +55,8 @@ LEFT_OUT = frozenset({"seconds", "iterations", "message", "p_value", "adjusted_p
 """How the answer was reached, and what jumps where it does not matter."""
 FILES = frozenset({"drifts.after", "outliers.recording"})
 """Where an answer names files, whose places may be others."""
+UNDER_WAY = "rerun-under-way.txt"
+"""Stands in the output folder until the work is done: the checksum of the result that is made again."""
 VERSIONS = ("friction_ocp", "casadi", "numpy", "scipy", "python", "code")
 
 Json = Mapping[str, Any]
@@ -104,7 +106,7 @@ def rerun(
         raise FrictionOcpError(Finding(str(folder), "this is where the result lies", remedy="give another --out"))
     places = [_place(item, path, problem) for item in made["problems"]]
     problems = [load_problem(place, item["text"]) for place, item in zip(places, made["problems"], strict=True)]
-    _forget_finished(folder)
+    _begin(folder, hashlib.sha256(path.read_bytes()).hexdigest())
     _COMMANDS[made["command"]["name"]](problems, made, folder, execution)
     after = read_result(folder / "result.json")
     _forget(folder)
@@ -169,16 +171,28 @@ def _place(item: Json, result: Path, stated: Path | None) -> Path:
     return next((path for path in (named, *above) if path.exists()), named)
 
 
-def _forget_finished(folder: Path) -> None:
-    """Drop what an earlier repetition that came to its end had made; one that was interrupted goes on."""
-    if (folder / "rerun.json").exists():
+def _begin(folder: Path, result: str) -> None:
+    """Take a folder for making a result again; go on with what an interrupted repetition of the same one has left.
+
+    Raises FrictionOcpError where fits or tasks lie there that no repetition made: they would be lost at the end.
+    """
+    marker = folder / UNDER_WAY
+    begun = marker.read_text(encoding="utf-8") if marker.exists() else None
+    kept = [name for name in (STORE, "tasks") if (folder / name).exists()]
+    if kept and begun is None:
+        what = f"the work of another command lies here ({', '.join(kept)})"
+        raise FrictionOcpError(Finding(str(folder), what, "a folder of its own", "give another --out"))
+    if begun != result:
         _forget(folder)
-        (folder / "rerun.json").unlink()
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(marker, result)
 
 
 def _forget(folder: Path) -> None:
+    """Drop what a repetition kept so that it could go on."""
     shutil.rmtree(folder / "tasks", ignore_errors=True)
-    (folder / STORE).unlink(missing_ok=True)
+    for name in (STORE, UNDER_WAY, "rerun.json"):
+        (folder / name).unlink(missing_ok=True)
 
 
 def _identify(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:

@@ -15,7 +15,8 @@ import pytest
 from servo_problem import write_servo
 
 import friction_ocp as fo
-from friction_ocp.cli import DONE, WRONG_INPUT, main
+from friction_ocp import repetition
+from friction_ocp.cli import DONE, INTERRUPTED, WRONG_INPUT, main
 from friction_ocp.parameters import Free
 
 sys.path.insert(0, str(Path(__file__).parent / "fleet"))
@@ -262,3 +263,39 @@ def test_a_parameter_may_differ_by_a_share_of_its_standard_error(copied: Path, s
     status, found = rerun(copied, "--tolerance", "1e-9")
     places = [] if expected == DONE else ["parameters.motor.inertia.value"]
     assert (status, [item["where"] for item in found["differences"]]) == (expected, places)
+
+
+def test_the_store_of_a_fleet_is_not_lost(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder with the work of another command is refused before anything is done, and left as it is."""
+    for kept in ("fits.sqlite", "tasks/start-1.json"):
+        folder = tmp_path / Path(kept).stem
+        (folder / kept).parent.mkdir(parents=True)
+        (folder / kept).write_text("dear", encoding="utf-8")
+        assert main(["rerun", str(made / "out"), "--out", str(folder)]) == WRONG_INPUT
+        assert "the work of another command lies here" in capsys.readouterr().err
+        assert (folder / kept).read_text(encoding="utf-8") == "dear"
+        assert not (folder / "result.json").exists()
+
+
+def test_an_interrupted_repetition_goes_on_in_its_folder(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it had finished is found again, whatever else is made again there is not, and at the end none is left."""
+    finished = tmp_path / "tasks" / "start-1.json"
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        finished.parent.mkdir()
+        finished.write_text("{}", encoding="utf-8")
+        raise KeyboardInterrupt
+
+    command = ["rerun", str(made / "out"), "--out", str(tmp_path), "--workers", "1"]
+    with monkeypatch.context() as patch:
+        patch.setattr(repetition, "identify", interrupted)
+        assert main(command) == INTERRUPTED
+    found: list[bool] = []
+    real = repetition.identify
+    monkeypatch.setattr(repetition, "identify", lambda *given: (found.append(finished.exists()), real(*given))[1])
+    assert main(command) == DONE
+    assert found == [True]
+    assert {path.name for path in tmp_path.iterdir()} >= {"rerun.json", "result.json"}
+    assert not finished.exists() and not (tmp_path / "rerun-under-way.txt").exists()
