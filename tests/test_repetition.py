@@ -299,3 +299,16 @@ def test_an_interrupted_repetition_goes_on_in_its_folder(
     assert found == [True]
     assert {path.name for path in tmp_path.iterdir()} >= {"rerun.json", "result.json"}
     assert not finished.exists() and not (tmp_path / "rerun-under-way.txt").exists()
+
+
+@pytest.mark.parametrize("command", ["rerun", "compare"])
+def test_a_folder_is_named_after_the_whole_name_of_the_result(
+    command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two versions of a model do not share an output folder: what follows a dot is a part of the name."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("arm.v1-identify", "arm.v2-identify"):
+        shutil.copytree(made / "out", name)
+    options = ["arm.v1-identify", *(["arm.v2-identify"] if command == "compare" else ["--workers", "1"])]
+    assert main([command, *options]) == DONE
+    assert [path.name for path in Path("results").iterdir()] == [f"arm.v1-identify-{command}"]
