@@ -294,7 +294,12 @@ def test_an_interrupted_repetition_goes_on_in_its_folder(
         assert main(command) == INTERRUPTED
     found: list[bool] = []
     real = repetition.identify
-    monkeypatch.setattr(repetition, "identify", lambda *given: (found.append(finished.exists()), real(*given))[1])
+
+    def watched(*given: Any) -> Any:
+        found.append(finished.exists())
+        return real(*given)
+
+    monkeypatch.setattr(repetition, "identify", watched)
     assert main(command) == DONE
     assert found == [True]
     assert {path.name for path in tmp_path.iterdir()} >= {"rerun.json", "result.json"}
