@@ -184,6 +184,21 @@ def test_samples_that_a_logger_marks_invalid_are_missing(tmp_path: Path) -> None
     np.testing.assert_array_equal(np.isnan(values), bits)
 
 
+@pytest.mark.parametrize("kind", ["bool_", "int16", "float32"])
+def test_missing_values_of_parquet_are_missing(tmp_path: Path, kind: str) -> None:
+    """A null in a column of numbers or truth values becomes NaN."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    make: Any = getattr(pa, kind)
+    table = pa.table({"t": pa.array([0.0, 1.0, 2.0]), "x": pa.array([1, None, 0], pa.int8()).cast(make())})
+    pq.write_table(table, tmp_path / "run.parquet")
+    channels, time = {"x": {"column": "x", "unit": "1"}}, {"column": "t", "unit": "s"}
+    case = ForeignCase(lambda folder: folder / "run.parquet", channels, time)
+    values = import_recording(tmp_path / "run.parquet", case.map(tmp_path)).channels["x"].values
+    np.testing.assert_array_equal(values, [1.0, np.nan, 0.0])
+
+
 @pytest.mark.parametrize("turn", [360.0, 65536.0])
 def test_wraps_are_unrolled(tmp_path: Path, turn: float) -> None:
     """A counter that starts over is a straight motion again, past missing samples, and is found by --inspect."""
