@@ -110,8 +110,7 @@ def rerun(
     _COMMANDS[made["command"]["name"]](problems, made, folder, execution)
     after = read_result(folder / "result.json")
     _forget(folder)
-    answers = ({key: one[key] for key in COMPARED if key in one} for one in (before, after))
-    pairs = list(_pairs("", *answers, tolerance))
+    pairs = list(_pairs("", _answer(before), _answer(after), tolerance))
     differences = tuple(_differences(pairs))
     changed = tuple(_changed(made, after["provenance"], places, problems))
     found = Repetition(changed, len(pairs), differences)
@@ -267,6 +266,10 @@ def _changed(before: Json, after: Json, places: Sequence[Path], problems: Sequen
             yield f"{what} was {str(before.get(name))[:12]}, is {str(after.get(name))[:12]}"
     if before.get("model") != provenance(problems[0], "")["model"]:
         yield "the problem had been changed in Python after its file was read"
+
+
+def _answer(result: Json) -> dict[str, Any]:
+    return {key: result[key] for key in COMPARED if key in result}
 
 
 def _pairs(where: str, before: Any, after: Any, tolerance: float) -> Iterator[tuple[str, Any, Any, float]]:
