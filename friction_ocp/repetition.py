@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -50,8 +51,12 @@ COMPARED = (
     "outliers",
 )
 """What of a result is its answer."""
-LEFT_OUT = frozenset({"seconds", "iterations", "message", "p_value", "adjusted_p_value", "recording", "after"})
-"""How the answer was reached, what jumps where it does not matter, and where files lay."""
+LEFT_OUT = frozenset({"seconds", "iterations", "message", "p_value", "adjusted_p_value"})
+"""How the answer was reached, and what jumps where it does not matter."""
+FILES = frozenset({"drifts.after", "outliers.recording"})
+"""Where an answer names files, whose places may be others."""
+UNDER_WAY = "rerun-under-way.txt"
+"""Stands in the output folder until the work is done: the checksum of the result that is made again."""
 VERSIONS = ("friction_ocp", "casadi", "numpy", "scipy", "python", "code")
 
 Json = Mapping[str, Any]
@@ -101,12 +106,12 @@ def rerun(
         raise FrictionOcpError(Finding(str(folder), "this is where the result lies", remedy="give another --out"))
     places = [_place(item, path, problem) for item in made["problems"]]
     problems = [load_problem(place, item["text"]) for place, item in zip(places, made["problems"], strict=True)]
-    _forget_finished(folder)
+    _begin(folder, hashlib.sha256(path.read_bytes()).hexdigest())
     _COMMANDS[made["command"]["name"]](problems, made, folder, execution)
     after = read_result(folder / "result.json")
     _forget(folder)
-    pairs = list(_pairs("", *({key: one[key] for key in COMPARED if key in one} for one in (before, after))))
-    differences = tuple(_differences(pairs, tolerance))
+    pairs = list(_pairs("", _answer(before), _answer(after), tolerance))
+    differences = tuple(_differences(pairs))
     changed = tuple(_changed(made, after["provenance"], places, problems))
     found = Repetition(changed, len(pairs), differences)
     _write(found, folder)
@@ -165,16 +170,28 @@ def _place(item: Json, result: Path, stated: Path | None) -> Path:
     return next((path for path in (named, *above) if path.exists()), named)
 
 
-def _forget_finished(folder: Path) -> None:
-    """Drop what an earlier repetition that came to its end had made; one that was interrupted goes on."""
-    if (folder / "rerun.json").exists():
+def _begin(folder: Path, result: str) -> None:
+    """Take a folder for making a result again; go on with what an interrupted repetition of the same one has left.
+
+    Raises FrictionOcpError where fits or tasks lie there that no repetition made: they would be lost at the end.
+    """
+    marker = folder / UNDER_WAY
+    begun = marker.read_text(encoding="utf-8") if marker.exists() else None
+    kept = [name for name in (STORE, "tasks") if (folder / name).exists()]
+    if kept and begun is None:
+        what = f"the work of another command lies here ({', '.join(kept)})"
+        raise FrictionOcpError(Finding(str(folder), what, "a folder of its own", "give another --out"))
+    if begun != result:
         _forget(folder)
-        (folder / "rerun.json").unlink()
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(marker, result)
 
 
 def _forget(folder: Path) -> None:
+    """Drop what a repetition kept so that it could go on."""
     shutil.rmtree(folder / "tasks", ignore_errors=True)
-    (folder / STORE).unlink(missing_ok=True)
+    for name in (STORE, UNDER_WAY, "rerun.json"):
+        (folder / name).unlink(missing_ok=True)
 
 
 def _identify(problems: Sequence[Problem], made: Json, folder: Path, execution: Execution) -> None:
@@ -251,42 +268,46 @@ def _changed(before: Json, after: Json, places: Sequence[Path], problems: Sequen
         yield "the problem had been changed in Python after its file was read"
 
 
-def _pairs(where: str, before: Any, after: Any) -> Iterator[tuple[str, Any, Any, float]]:
-    """Yield place, both values and the size that differences are measured by, of everything that either has."""
+def _answer(result: Json) -> dict[str, Any]:
+    return {key: result[key] for key in COMPARED if key in result}
+
+
+def _pairs(where: str, before: Any, after: Any, tolerance: float) -> Iterator[tuple[str, Any, Any, float]]:
+    """Yield place, both values and the difference that numbers may have, of everything that either has."""
     if isinstance(before, dict) and isinstance(after, dict):
         ours, theirs = cast("Json", before), cast("Json", after)
         slack = _slack(ours)
         for key in dict.fromkeys((*ours, *theirs)):
-            if key in LEFT_OUT:
+            place = f"{where}.{key}" if where else key
+            if key in LEFT_OUT or re.sub(r"\[\d+\]", "", place) in FILES:
                 continue
-            for name, one, other, size in _pairs(f"{where}.{key}" if where else key, ours.get(key), theirs.get(key)):
-                yield name, one, other, max(size, slack if key in ("value", "interval95") else 0.0)
+            for name, one, other, allowed in _pairs(place, ours.get(key), theirs.get(key), tolerance):
+                yield name, one, other, max(allowed, slack if key in ("value", "interval95") else 0.0)
     elif isinstance(before, list) and isinstance(after, list) and len(cast("Any", before)) == len(cast("Any", after)):
         pairs = list(zip(cast("list[Any]", before), cast("list[Any]", after), strict=True))
         largest = max((abs(v) for pair in pairs for v in pair if _is_number(v)), default=0.0)
         for index, (one, other) in enumerate(pairs):
-            yield from (
-                (name, a, b, max(size, largest)) for name, a, b, size in _pairs(f"{where}[{index}]", one, other)
-            )
+            for name, a, b, allowed in _pairs(f"{where}[{index}]", one, other, tolerance):
+                yield name, a, b, max(allowed, tolerance * largest)
     else:
         both = cast("tuple[Any, Any]", (before, after))
-        yield where, *both, max((abs(value) for value in both if _is_number(value)), default=0.0)
+        yield where, *both, tolerance * max((abs(value) for value in both if _is_number(value)), default=0.0)
 
 
 def _slack(content: Json) -> float:
-    """Return the size of an estimate for which the tolerance is the allowed share of its standard error."""
+    """Return the share of its standard error by which an estimate may differ."""
     std_error = content.get("std_error")
-    return SHARE_OF_ERROR / TOLERANCE * float(std_error) if _is_number(std_error) else 0.0
+    return SHARE_OF_ERROR * float(std_error) if _is_number(std_error) else 0.0
 
 
 def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _differences(pairs: Sequence[tuple[str, Any, Any, float]], tolerance: float) -> Iterator[Difference]:
-    for where, before, after, size in pairs:
+def _differences(pairs: Sequence[tuple[str, Any, Any, float]]) -> Iterator[Difference]:
+    for where, before, after, allowed in pairs:
         if _is_number(before) and _is_number(after):
-            if abs(before - after) > tolerance * size:
+            if abs(before - after) > allowed:
                 yield Difference(where, before, after)
         elif before != after:
             yield Difference(where, before, after)

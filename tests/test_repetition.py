@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ import pytest
 from servo_problem import write_servo
 
 import friction_ocp as fo
-from friction_ocp.cli import DONE, WRONG_INPUT, main
+from friction_ocp import repetition
+from friction_ocp.cli import DONE, INTERRUPTED, WRONG_INPUT, main
 from friction_ocp.parameters import Free
 
 sys.path.insert(0, str(Path(__file__).parent / "fleet"))
@@ -224,3 +226,94 @@ def test_the_servo_is_the_same_again(tmp_path: Path) -> None:
     assert main(["identify", str(write_servo(tmp_path)), "--out", str(tmp_path / "out")]) == DONE
     status, found = rerun(tmp_path)
     assert (status, found["differences"], found["changed"]) == (DONE, [], [])
+
+
+def edited(folder: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    """Change what the first result of a folder says."""
+    path = folder / "out" / "result.json"
+    document = json.loads(path.read_text(encoding="utf-8"))
+    edit(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+
+
+def test_what_a_diagnosis_found_afterwards_is_compared(tmp_path: Path) -> None:
+    """The gap that is left differs, and so does what follows from it."""
+    command = ["diagnose", str(write_case(tmp_path, axis())), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(command) == DONE
+
+    def halve(document: dict[str, Any]) -> None:
+        for found in document["gap"]["after"].values():
+            found["rms"] *= 0.5
+
+    edited(tmp_path, halve)
+    status, found = rerun(tmp_path)
+    assert status == WRONG_INPUT
+    assert {item["where"] for item in found["differences"]} == {"gap.after.position.rms"}
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.005, DONE), (0.02, WRONG_INPUT)])
+def test_a_parameter_may_differ_by_a_share_of_its_standard_error(copied: Path, share: float, expected: int) -> None:
+    """That share is 1 %, whatever the tolerance of all other numbers is."""
+
+    def shift(document: dict[str, Any]) -> None:
+        inertia = document["parameters"]["motor.inertia"]
+        inertia["value"] += share * inertia["std_error"]
+
+    edited(copied, shift)
+    status, found = rerun(copied, "--tolerance", "1e-9")
+    places = [] if expected == DONE else ["parameters.motor.inertia.value"]
+    assert (status, [item["where"] for item in found["differences"]]) == (expected, places)
+
+
+def test_the_store_of_a_fleet_is_not_lost(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder with the work of another command is refused before anything is done, and left as it is."""
+    for kept in ("fits.sqlite", "tasks/start-1.json"):
+        folder = tmp_path / Path(kept).stem
+        (folder / kept).parent.mkdir(parents=True)
+        (folder / kept).write_text("dear", encoding="utf-8")
+        assert main(["rerun", str(made / "out"), "--out", str(folder)]) == WRONG_INPUT
+        assert "the work of another command lies here" in capsys.readouterr().err
+        assert (folder / kept).read_text(encoding="utf-8") == "dear"
+        assert not (folder / "result.json").exists()
+
+
+def test_an_interrupted_repetition_goes_on_in_its_folder(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it had finished is found again, whatever else is made again there is not, and at the end none is left."""
+    finished = tmp_path / "tasks" / "start-1.json"
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        finished.parent.mkdir()
+        finished.write_text("{}", encoding="utf-8")
+        raise KeyboardInterrupt
+
+    command = ["rerun", str(made / "out"), "--out", str(tmp_path), "--workers", "1"]
+    with monkeypatch.context() as patch:
+        patch.setattr(repetition, "identify", interrupted)
+        assert main(command) == INTERRUPTED
+    found: list[bool] = []
+    real = repetition.identify
+
+    def watched(*given: Any) -> Any:
+        found.append(finished.exists())
+        return real(*given)
+
+    monkeypatch.setattr(repetition, "identify", watched)
+    assert main(command) == DONE
+    assert found == [True]
+    assert {path.name for path in tmp_path.iterdir()} >= {"rerun.json", "result.json"}
+    assert not finished.exists() and not (tmp_path / "rerun-under-way.txt").exists()
+
+
+@pytest.mark.parametrize("command", ["rerun", "compare"])
+def test_a_folder_is_named_after_the_whole_name_of_the_result(
+    command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two versions of a model do not share an output folder: what follows a dot is a part of the name."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("arm.v1-identify", "arm.v2-identify"):
+        shutil.copytree(made / "out", name)
+    options = ["arm.v1-identify", *(["arm.v2-identify"] if command == "compare" else ["--workers", "1"])]
+    assert main([command, *options]) == DONE
+    assert [path.name for path in Path("results").iterdir()] == [f"arm.v1-identify-{command}"]

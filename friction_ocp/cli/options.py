@@ -58,9 +58,9 @@ def positive(text: str) -> int:
     return number
 
 
-def output_folder(options: argparse.Namespace) -> Path:
-    """Return the output folder; refuse one that cannot be written before any work is done."""
-    folder: Path = options.out or Path("results") / f"{options.problem.stem}-{options.command}"
+def output_folder(options: argparse.Namespace, of: str = "") -> Path:
+    """Return the output folder, named after `of` or the problem; refuse one that cannot be written before any work."""
+    folder: Path = options.out or Path("results") / f"{of or options.problem.stem}-{options.command}"
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not there.is_dir():
         raise FrictionOcpError(Finding(str(folder), f"{there} is a file", "a folder, made where there is none"))

@@ -32,7 +32,7 @@ def _rerun(options: argparse.Namespace) -> int:
 
     result: Path = options.result
     named = (result if result.is_dir() else result.parent).resolve().name
-    folder = output_folder(argparse.Namespace(out=options.out, problem=Path(named), command="rerun"))
+    folder = output_folder(options, named)
     with progress_bar() as progress, task_bar() as watch:
         execution = Execution(executor(options), folder, progress, watch)
         found = rerun(result, folder, execution, options.tolerance, options.problem)

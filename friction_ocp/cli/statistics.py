@@ -93,8 +93,7 @@ def _compare_results(options: argparse.Namespace) -> int:
     if len(options.problems) < 2:
         raise FrictionOcpError(Finding("compare", "1 result given", "two or more"))
     named: Path = options.problems[0]
-    options.problem = Path((named if named.is_dir() else named.parent).resolve().name)
-    folder = output_folder(options)
+    folder = output_folder(options, (named if named.is_dir() else named.parent).resolve().name)
     document = side_by_side(read_results(options.problems))
     save_side_by_side(document, folder)
     print((folder / "result.json").read_text(encoding="utf-8") if options.json else side_by_side_text(document))

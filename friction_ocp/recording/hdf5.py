@@ -14,6 +14,7 @@ import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
+from friction_ocp.recording.attribute_text import attribute_text
 from friction_ocp.recording.checks import (
     check_attributes,
     check_recording,
@@ -207,10 +208,7 @@ class _Reader:
 
     def text(self, node: Any, key: str) -> str:
         """Return an attribute as text, "" where there is none."""
-        value = node.attrs.get(key, "")
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+        return attribute_text(node.attrs.get(key, ""))
 
     def array(self, path: str, label: str) -> FloatArray | None:
         """Return a one-dimensional numeric dataset, or report why it cannot be had."""

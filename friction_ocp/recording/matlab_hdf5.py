@@ -12,6 +12,7 @@ import h5py as _h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording.attribute_text import attribute_text
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, no_clock, opened, reading
 from friction_ocp.recording.import_map import ImportMap
 
@@ -82,8 +83,7 @@ def _series(node: Any, name: str) -> Iterator[_Series]:
 
 
 def _signal(node: Any, name: str, samples: int) -> Signal:
-    stated = next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), "")
-    unit = stated.decode(errors="replace") if isinstance(stated, bytes) else str(stated)
+    unit = attribute_text(next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), ""))
     matlab_class = node.attrs.get("MATLAB_class", b"")
     text = matlab_class in (b"char", "char") or node.attrs.get("MATLAB_empty", 0)
     return Signal(name, samples, unit, numeric=node.dtype.kind in "biuf" and not text)

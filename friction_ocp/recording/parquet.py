@@ -66,7 +66,7 @@ class _Reader:
             return np.where(missing, np.nan, counts * 1e-9)
         if self.types.is_integer(field.type) and not missing.any():
             return np.asarray(column)
-        return np.where(missing, np.nan, np.asarray(column.fill_null(0).cast(self.arrow.float64(), safe=False)))
+        return np.where(missing, np.nan, np.asarray(column.cast(self.arrow.float64(), safe=False).fill_null(0)))
 
     def _nanoseconds(self, column: Any) -> Values:
         kind: Any = self.arrow.duration("ns") if self._is_span(column.type) else self.arrow.timestamp("ns")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ from friction_ocp.recording.recording import Channel, FloatArray, Recording
 from friction_ocp.recording.static_points import StaticPoints
 
 EXACT_INTEGERS = 2**53
-"""Integers up to here are floats without loss; time in ns since 1970 is beyond it."""
+"""Integers up to here are floats without loss; time in ns since 1970 is beyond it, and as many ns are 104 days."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,10 @@ def static_points_of(file: ForeignFile, import_map: ImportMap, path: Path) -> St
 def _read(
     file: ForeignFile, wanted: Mapping[str, _Wanted], path: Path
 ) -> tuple[dict[str, tuple[FloatArray, str]], int]:
-    """Return values in SI and their unit by place, and from where times are counted; raises all findings together."""
+    """Return values in SI and their unit by place, and from where times count, ns; raises all findings together."""
     check_sizes(path, [item.signal for item in wanted.values()])
     raw = file.read(sorted({item.index for item in wanted.values()}))
-    origin = _far_origin([raw[item.index] for place, item in wanted.items() if _is_time(place)])
+    origin = _far_origin([(raw[item.index], item) for place, item in wanted.items() if _is_time(place)])
     findings: list[Finding] = []
     values: dict[str, tuple[FloatArray, str]] = {}
     for place, item in wanted.items():
@@ -171,10 +173,36 @@ def _without_time(import_map: ImportMap, wanted: Mapping[str, _Wanted]) -> list[
     ]
 
 
-def _far_origin(times: Sequence[Values]) -> int:
-    """Return the integer to count times from where they are too large for floats, such as ns since 1970; else 0."""
-    far = [int(time[0]) for time in times if time.dtype.kind in "iu" and time.size and int(time[0]) > EXACT_INTEGERS]
-    return min(far, default=0)
+def _far_origin(times: Sequence[tuple[Values, _Wanted]]) -> int:
+    """Return the earliest instant, ns, of far time axes where one of them is too large for floats; else 0."""
+    if not any(raw.dtype.kind in "iu" and raw.size and int(raw[0]) > EXACT_INTEGERS for raw, _ in times):
+        return 0
+    firsts = (_first_instant(raw, _nanoseconds(item)) for raw, item in times)
+    return min((first for first in firsts if first > EXACT_INTEGERS), default=0)
+
+
+def _nanoseconds(item: _Wanted) -> Fraction:
+    """Return how long one count of a time axis is, ns; 0 where its unit is none of time."""
+    try:
+        size, unit = to_si(1.0, item.unit, scale=item.entry.scale)
+    except FrictionOcpError:
+        return Fraction(0)
+    return Fraction(f"{float(size) * 1e9:.15g}") if unit == "s" else Fraction(0)
+
+
+def _first_instant(raw: Values, nanoseconds: Fraction) -> int:
+    """Return the first instant of a time axis in whole ns; 0 where it has none."""
+    seen = raw[np.isfinite(raw)] if is_real(raw) else raw[:0]
+    return math.floor(Fraction(seen[0].item()) * nanoseconds) if seen.size else 0
+
+
+def _since(raw: Values, origin: int, nanoseconds: Fraction) -> FloatArray:
+    """Return a time axis that counts from `origin`, ns, in its own unit; one that is not far counts from its own."""
+    if _first_instant(raw, nanoseconds) <= EXACT_INTEGERS:
+        return np.asarray(raw, dtype=np.float64)
+    whole, rest = divmod(Fraction(origin), nanoseconds)
+    exact = raw if raw.dtype.kind in "iu" else np.asarray(raw, dtype=np.float64)
+    return np.asarray(exact - exact.dtype.type(whole), dtype=np.float64) - float(rest / nanoseconds)
 
 
 def _converted(raw: Values, item: _Wanted, origin: int, path: Path) -> tuple[FloatArray, str]:
@@ -182,8 +210,8 @@ def _converted(raw: Values, item: _Wanted, origin: int, path: Path) -> tuple[Flo
     where = f"{path}: {item.place}"
     if not is_real(raw):
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' holds no real numbers but {raw.dtype}"))
-    shifted = raw - raw.dtype.type(origin) if origin and raw.dtype.kind in "iu" else raw
-    values = unroll(np.asarray(shifted, dtype=np.float64), item.entry.wrap, item.entry.reset, where)
+    counted = _since(raw, origin, _nanoseconds(item)) if origin else np.asarray(raw, dtype=np.float64)
+    values = unroll(counted, item.entry.wrap, item.entry.reset, where)
     converted, unit = to_si(values, item.unit, where, scale=item.entry.scale)
     if _is_time(item.place) and unit != "s":
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' is in {item.unit}", "a unit such as s, ms or us"))

@@ -70,6 +70,47 @@ def test_dates_count_from_the_first(tmp_path: Path) -> None:
     assert origins == ["2023-11-14T22:13:20.123456789Z", str(START_NS), "2023-11-14T22:13:20.123456789Z"]
 
 
+SECONDS: Any = fast()
+AXES: dict[str, Any] = {
+    "us": np.round(SECONDS * 1e6).astype(np.int64) + START_NS // 1000 + 1,
+    "s": SECONDS + START_NS * 1e-9,
+    "ms": np.round(SECONDS * 1e3).astype(np.uint64) + np.uint64(START_NS // 10**6),
+}
+"""The same instants as in ns since 1970, in other units: whole, or as floats."""
+
+
+@pytest.mark.parametrize(("unit", "rounding"), [("us", 1e-6), ("s", 1e-6), ("ms", 1e-3)])
+def test_axes_in_different_units_count_from_the_same_instant(tmp_path: Path, unit: str, rounding: float) -> None:
+    """Times since 1970 in ns and in another unit are the same times, up to what the coarser one can tell."""
+    nanoseconds = START_NS + np.round(fast() * 1e9).astype(np.int64)
+    np.savez(tmp_path / "run.npz", t_ns=nanoseconds, t=AXES[unit], x=angle())
+    channels = {
+        "a": {"column": "x", "unit": "deg", "time": {"column": "t_ns", "unit": "ns"}},
+        "b": {"column": "x", "unit": "deg", "time": {"column": "t", "unit": unit}},
+    }
+    case = ForeignCase(lambda folder: folder / "run.npz", channels)
+    found = import_recording(tmp_path / "run.npz", case.map(tmp_path))
+    ours, theirs = (found.channels[name].time for name in "ab")
+    assert 0.0 <= min(ours[0], theirs[0]) < rounding
+    np.testing.assert_allclose(theirs, ours, atol=rounding)
+    origin = int(found.attributes["time_origin"])
+    assert abs(origin - START_NS) < rounding * 1e9
+
+
+def test_an_axis_that_counts_from_its_own_start_is_left_alone(tmp_path: Path) -> None:
+    """Beside times since 1970, whole seconds since the start stay what they are."""
+    nanoseconds = START_NS + np.round(fast() * 1e9).astype(np.int64)
+    np.savez(tmp_path / "run.npz", t_ns=nanoseconds, x=angle(), t=np.arange(5), y=np.arange(5.0))
+    channels = {
+        "a": {"column": "x", "unit": "deg", "time": {"column": "t_ns", "unit": "ns"}},
+        "b": {"column": "y", "unit": "A", "time": {"column": "t", "unit": "s"}},
+    }
+    case = ForeignCase(lambda folder: folder / "run.npz", channels)
+    found = import_recording(tmp_path / "run.npz", case.map(tmp_path))
+    np.testing.assert_allclose(found.channels["a"].time, fast(), atol=NANOSECOND)
+    np.testing.assert_array_equal(found.channels["b"].time, np.arange(5.0))
+
+
 @pytest.mark.parametrize(
     ("name", "module", "extra"),
     [
@@ -141,6 +182,21 @@ def test_samples_that_a_logger_marks_invalid_are_missing(tmp_path: Path) -> None
     case = ForeignCase(lambda folder: folder / "run.mf4", {"angle": {"column": "angle"}})
     values = import_recording(tmp_path / "run.mf4", case.map(tmp_path)).channels["angle"].values
     np.testing.assert_array_equal(np.isnan(values), bits)
+
+
+@pytest.mark.parametrize("kind", ["bool_", "int16", "float32"])
+def test_missing_values_of_parquet_are_missing(tmp_path: Path, kind: str) -> None:
+    """A null in a column of numbers or truth values becomes NaN."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    make: Any = getattr(pa, kind)
+    table = pa.table({"t": pa.array([0.0, 1.0, 2.0]), "x": pa.array([1, None, 0], pa.int8()).cast(make())})
+    pq.write_table(table, tmp_path / "run.parquet")
+    channels, time = {"x": {"column": "x", "unit": "1"}}, {"column": "t", "unit": "s"}
+    case = ForeignCase(lambda folder: folder / "run.parquet", channels, time)
+    values = import_recording(tmp_path / "run.parquet", case.map(tmp_path)).channels["x"].values
+    np.testing.assert_array_equal(values, [1.0, np.nan, 0.0])
 
 
 @pytest.mark.parametrize("turn", [360.0, 65536.0])

@@ -18,6 +18,7 @@ from hypothesis.extra import numpy as hnp
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.recording import hdf5
 from friction_ocp.recording.hdf5 import read_recording, write_recording
+from friction_ocp.recording.import_recording import inspect_file
 from friction_ocp.recording.recording import Channel, Recording
 
 Edit = Callable[[Any], None]
@@ -119,6 +120,21 @@ def test_units_become_si(tmp_path: Path) -> None:
     np.testing.assert_allclose(recording.channels["encoder"].time, np.arange(5) * 1e-4)
     assert [channel.unit for channel in recording.channels.values()] == ["1", "rad", "rad"]
     assert recording.channels["enable"].values.tolist() == [1, 0, 1, 1, 1]
+
+
+@pytest.mark.parametrize("value", [[b"deg"], np.array([["deg"]], dtype="S3"), np.array(["deg"], dtype=object)])
+def test_units_in_arrays_of_one_element_are_read(tmp_path: Path, value: Any) -> None:
+    """Other programs store an attribute as an array; its only element counts."""
+
+    def edit(file: Any) -> None:
+        file["channels/position"].attrs["unit"] = value
+
+    path = write(tmp_path / "a.h5", edit)
+    with h5py.File(path) as file:
+        stored: Any = file["channels/position"]
+        expected = np.deg2rad(stored[()])
+    np.testing.assert_allclose(read_recording(path).channels["position"].values, expected)
+    assert next(row for row in inspect_file(path).splitlines() if "channels.position" in row).split()[2] == "deg"
 
 
 def test_channel_on_its_own_clock_needs_no_common_time(tmp_path: Path) -> None:
