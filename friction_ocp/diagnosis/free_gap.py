@@ -127,7 +127,7 @@ def gap_map(base: FittedModel, before: FreeErrors, after: FreeErrors) -> tuple[C
     """
     cells: list[Cell] = []
     for first, then in zip(before.runs, after.runs, strict=True):
-        labels: IntArray = regimes(base.model, base.theta, first)
+        labels: IntArray = regimes(base.model, first)
         for k, channel in enumerate(base.model.problem.drive.outputs):
             for code, regime in enumerate(REGIMES):
                 at = (labels == code) & np.isfinite(first.measured[:, k]) & np.isfinite(then.measured[:, k])

@@ -20,7 +20,7 @@ AROUND_REVERSAL = 0.01
 """Share of the recording on either side of a change of direction."""
 
 
-def regimes(model: Model, theta: FloatArray, run: FreeRun) -> IntArray:
+def regimes(model: Model, run: FreeRun) -> IntArray:
     """Return (n,) the regime of the first shaft whose motion is measured, from the measurement itself."""
     speed, acceleration = _motion(model, run)
     fastest = max(float(np.quantile(np.abs(speed), 0.98)), 1e-300)

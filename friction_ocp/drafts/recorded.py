@@ -98,7 +98,7 @@ def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[
     driving, driven_by = min(measured, key=lambda item: order.index(item[1]))
     channels: dict[str, dict[str, Any]] = {driving: {"measures": f"motor.{driven_by}", "role": "input"}}
     for name, unit in units.items():
-        if unit in _SIGNALS and not _REFERENCE.search(name) and _fits(unit, name, axis):
+        if unit in _SIGNALS and not _REFERENCE.search(name) and _fits(unit, axis):
             channels[name] = {"measures": f"{_shaft(name, unit, axis)}.{_SIGNALS[unit]}"}
         elif unit == "degC":
             channels[name] = {"measures": "temperature", "role": "input"}
@@ -146,7 +146,7 @@ def _listed(units: Mapping[str, str]) -> str:
     return ", ".join(f"{name} ({unit})" for name, unit in units.items())
 
 
-def _fits(unit: str, name: str, axis: Axis) -> bool:
+def _fits(unit: str, axis: Axis) -> bool:
     """Whether some shaft of the axis moves in this unit."""
     linear = unit.startswith("m")
     return axis.linear if linear else (not axis.linear or axis.motor_inertia is not None)

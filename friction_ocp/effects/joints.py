@@ -73,7 +73,7 @@ class ComplianceEffect(AbstractEffect):
         return Augmentation(added, {path: np.inf}, trials)
 
 
-def _twist(drive: Drive, item: Transmission, clues: Clues) -> tuple[float, float]:
+def _twist(item: Transmission, clues: Clues) -> tuple[float, float]:
     """Return typical torque, N m, and twist, rad, of an elastic transmission on its output side."""
     torque = clues.typical_torque[item.to_shaft]
     return torque, torque / max(clues.numbers[f"{item.name}.stiffness"], 1e-300)
@@ -89,7 +89,7 @@ class StiffeningEffect(AbstractEffect):
         return [item.name for item in drive.transmissions if not item.rigid and is_off(item.stiffening)]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        torque, twist = _twist(drive, transmission(drive, place), clues)
+        torque, twist = _twist(transmission(drive, place), clues)
         size, path = 0.1 * torque / twist**3, f"{place}.stiffening"
         added = change_transmission(drive, place, stiffening=Free(size, 0.0, 1e4 * size))
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
@@ -105,7 +105,7 @@ class TransmissionHysteresisEffect(AbstractEffect):
         return [item.name for item in drive.transmissions if not item.rigid and item.hysteresis is None]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        torque, twist = _twist(drive, transmission(drive, place), clues)
+        torque, twist = _twist(transmission(drive, place), clues)
         path, size = f"{place}.hysteresis", 0.05 * torque
         twists = [0.05 * twist, 0.3 * twist, 2.0 * twist]
         loop = Hysteresis(upwards(size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
@@ -132,7 +132,7 @@ class KinematicErrorEffect(AbstractWaveEffect):
 
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         item = transmission(drive, place)
-        _, twist = _twist(drive, item, clues)
+        _, twist = _twist(item, clues)
         found = [*clues.periods(item.from_shaft, "theta")[:2], *clues.periods(item.to_shaft, "theta")[:2]]
         ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
         return 0.1 * twist, [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]

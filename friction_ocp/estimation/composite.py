@@ -70,11 +70,6 @@ class Rows:
         return self.constant + float(self.gradient @ step + 0.5 * step @ self.hessian @ step)
 
 
-def is_composite(program: Program) -> bool:
-    """Whether `solve_composite` can solve a program: the absolute loss, and no start state that is a variable."""
-    return isinstance(program.loss, Absolute) and program.without_nodes
-
-
 def linearised(program: Program, point: Point) -> Rows:
     """Return the residuals of a program without variable start states, and their derivatives."""
     errors: list[FloatArray] = []
@@ -93,7 +88,7 @@ def linearised(program: Program, point: Point) -> Rows:
 def solve_composite(
     program: Program, start: Point, tolerances: Tolerances = USUAL, watch: Watch | None = None
 ) -> Solution:
-    """Minimise a program for which `is_composite` holds; the start is moved inside the bounds first."""
+    """Minimise a program of the absolute loss without variable start states; the start is moved into the bounds."""
     loss, space, iteration = program.loss, program.space, 0
     assert isinstance(loss, Absolute)
     point = Point(space.clip(start.theta), start.nodes)

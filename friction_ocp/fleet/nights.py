@@ -29,11 +29,6 @@ class Night:
     sha256: str
     set: Mapping[str, float]
 
-    @property
-    def name(self) -> str:
-        """Machine and file."""
-        return f"{self.machine}/{self.path.stem}"
-
 
 def find_recordings(places: Iterable[Path]) -> list[Path]:
     """Return files as given, and every .h5 file below the folders among them, each once."""

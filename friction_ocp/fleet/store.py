@@ -100,11 +100,6 @@ class Store:
         with self._opened() as connection:
             return int(connection.execute("SELECT count(*) FROM fits WHERE problem <> ?", (problem,)).fetchone()[0])
 
-    def keys(self, problem: str) -> set[str]:
-        """Return the keys of all fits of one problem."""
-        with self._opened() as connection:
-            return {row[0] for row in connection.execute("SELECT key FROM fits WHERE problem = ?", (problem,))}
-
     def add(self, fit: StoredFit) -> None:
         """Add a fit, or put it in the place of the one with the same key."""
         values = [getattr(fit, name) for name in _NAMES[:-1]] + [json.dumps(fit.document, allow_nan=False)]

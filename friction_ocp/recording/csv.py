@@ -1,4 +1,4 @@
-"""Delimited text: sniff its layout, read columns of numbers, make a recording of them."""
+"""Delimited text: sniff its layout, read columns of numbers."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, no_clock
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
-from friction_ocp.recording.recording import FloatArray, Recording
-from friction_ocp.recording.table import recording_of
+from friction_ocp.recording.recording import FloatArray
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
@@ -39,13 +38,6 @@ class Layout:
     """Line of the first row of numbers, from 1."""
     encoding: str
     decimal: str = "."
-
-
-def read_csv(path: str | Path, import_map: ImportMap) -> Recording:
-    """Read the mapped columns of delimited text into a recording in SI units."""
-    path = Path(path)
-    with open_csv(path, import_map) as file:
-        return recording_of(file, import_map, path)
 
 
 @contextmanager

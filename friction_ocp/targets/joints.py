@@ -107,7 +107,7 @@ def joint_drive(fitted: Fitted, elastic: bool = True) -> JointDrive:
     structure = topology(drive)
     top = {name: item.top for name, item in fitted.model.speeds.items()}
     joints = tuple(_joint(drive, structure, group, top, losses) for group in range(len(structure.roots)))
-    springs = tuple(_spring(item, structure, joints, losses) for item in structure.elastic)
+    springs = tuple(_spring(item, structure, joints) for item in structure.elastic)
     signals = {motor.name: mech.driving_signal(motor) for motor in drive.motors}
     actuators = tuple(
         _actuator(motor, str(signals[motor.name]), structure, joints, losses)
@@ -215,7 +215,7 @@ def _transmission_losses(item: Transmission) -> Iterator[Loss]:
         yield Loss(f"{item.name}.damping", "acts within the free play too")
 
 
-def _spring(item: Transmission, structure: Topology, joints: tuple[Joint, ...], losses: list[Loss]) -> Spring:
+def _spring(item: Transmission, structure: Topology, joints: tuple[Joint, ...]) -> Spring:
     parts: list[tuple[str, float]] = []
     for name, factor in ((item.from_shaft, 1.0 / float(item.ratio)), (item.to_shaft, -1.0)):
         joint = joints[structure.group_of[name]]

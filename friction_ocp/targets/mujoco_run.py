@@ -50,7 +50,6 @@ class MuJoCoRun:
         self._functions = _functions(self._mech)
         self._address = [int(self._model.joint(joint.name).qposadr[0]) for joint in drive.joints]
         self._dof = [int(self._model.joint(joint.name).dofadr[0]) for joint in drive.joints]
-        self._speed = np.array([joint.speed for joint in drive.joints])
         self._own = bool(self._mech.extra_names or self._mech.lagging or self._mech.memory_names)
 
     @property

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.recording.csv import open_csv, read_csv, sniff_layout
+from friction_ocp.recording.csv import open_csv, sniff_layout
 from friction_ocp.recording.hdf5 import read_recording, write_recording
 from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
 from friction_ocp.recording.import_recording import import_recording, inspect_file

@@ -85,7 +85,7 @@ def _if_moving_otherwise(case: Case, channel: Channel, unit: str) -> str:
 
 def inputs_move(case: Case) -> Iterator[Finding]:
     """What drives the machine changes in at least one training recording."""
-    driving = [channel for channel in case.drive.inputs if is_driving(case.drive, channel)]
+    driving = [channel for channel in case.drive.inputs if is_driving(channel)]
     still = {channel.name: level for channel in driving if (level := _only_level(case, channel)) is not None}
     for name, level in still.items():
         what = f"input '{name}' never moves: it is {level} throughout all training recordings"

@@ -275,7 +275,7 @@ def process_noise_acts_on_shafts(case: Case) -> Iterator[Finding]:
             yield Finding(where, f"unknown shaft '{name}'", f"there are {', '.join(names)}", closest(name, names))
 
 
-def is_driving(drive: Drive, channel: Channel) -> bool:
+def is_driving(channel: Channel) -> bool:
     """Whether an input channel is what moves the machine: a set point, a command or a prescribed motion."""
     return channel.role == "input" and channel.signal in ("theta", "omega", *DRIVING_SIGNALS, "current_command")
 
