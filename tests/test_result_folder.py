@@ -144,6 +144,15 @@ def test_a_problem_that_its_file_does_not_describe_has_no_fitted_file(estimate: 
     assert fitted_problem(replace(estimate, parameters=(*estimate.parameters, added)), tmp_path) is None
 
 
+@pytest.mark.parametrize("left", [0, 1])
+def test_a_run_that_broke_down_has_no_coherence(simulation: Simulation, left: int) -> None:
+    """What is simulated at the first node alone, or nowhere, is a result without coherence."""
+    whole = simulation.train[0]
+    run = replace(whole, simulated=np.where(np.arange(whole.time.size)[:, None] < left, whole.simulated, np.nan))
+    document = simulation_document(replace(simulation, train=(run,)))
+    assert document["coherence"][run.name] == {}
+
+
 def test_the_series_are_measurement_and_simulation_on_one_clock(simulation: Simulation, tmp_path: Path) -> None:
     """result.h5 holds /<recording>/<channel>/{time, measured, simulated}, whose difference has the reported rms."""
     write_result_series(tmp_path / "result.h5", simulation_series(simulation))
