@@ -204,18 +204,20 @@ def _weighed_again(
 ) -> tuple[Round, Rival | None]:
     """Return a round with the chances that rivals have in the place of what it `held`, now that others are in.
 
-    What they gain is counted from what was accepted, which is worth what it was. Where one of them is now the more
-    probable it is accepted instead, and returned beside, with its fit.
+    What they gain is counted from what was accepted, which is worth what the best of the round was: what took its place
+    may have been worth nothing before the later ones were in. Where one of them is now the more probable it is accepted
+    instead, and returned beside, with its fit.
     """
     if not tried:
         return item, None
     known = dict(zip((rival.key for rival in item.choice.rivals), item.choice.probabilities, strict=True))
-    worth = np.full(benchmark.blocks.count, float(np.sum(held.gains)) / benchmark.blocks.count)
+    best = max(float(np.nansum(rival.gains)) for rival in (held, *item.choice.rivals))
+    worth = np.full(benchmark.blocks.count, best / benchmark.blocks.count)
     own = held.refitted(benchmark.fitted, worth)
     others = [replace(rival, gains=worth + rival.gains) for rival in tried]
     again = choose([own, *others], benchmark.blocks, len(folds(benchmark.fitted)), level, rng)
     keys = {rival.key for rival in again.rivals}
-    shared = sum(known[key] for key in keys)
+    shared = sum(known[key] for key in keys) / sum(again.probabilities)
     known |= {rival.key: shared * chance for rival, chance in zip(again.rivals, again.probabilities, strict=True)}
     leader = again.rivals[0]
     aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]

@@ -146,3 +146,10 @@ def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: P
     assert chances[gravity] < LEVEL < chances[differing] < chances[constant]
     assert sum(chances.values()) == pytest.approx(sum(rounds[0].choice.probabilities))
     assert current.cost < rounds[0].before.cost
+    held = rounds[0].accepted
+    assert held is not None
+    worthless = replace(held, gains=-held.gains)
+    rivals = tuple(worthless if item is held else item for item in rounds[0].choice.rivals)
+    rounds[0] = replace(rounds[0], accepted=worthless, choice=replace(rounds[0].choice, rivals=rivals))
+    _, told, _ = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
+    assert sum(told[0].choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
