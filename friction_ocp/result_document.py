@@ -155,7 +155,7 @@ def _coherences(simulation: Simulation) -> dict[str, Any]:
         told[run.name] = {
             name: _coherence(coherence(run.time, run.measured[:, k], run.simulated[:, k]))
             for k, name in enumerate(simulation.units)
-            if np.isfinite(run.measured[:, k]).sum() >= FEWEST_SAMPLES
+            if (np.isfinite(run.measured[:, k]) & np.isfinite(run.simulated[:, k])).sum() >= FEWEST_SAMPLES
         }
     return told
 

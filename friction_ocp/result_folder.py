@@ -48,11 +48,11 @@ def fitted_problem(estimate: Estimate, folder: Path) -> str | None:
     """Return the text of fitted.yaml; None for a problem that its file, if any, no longer describes."""
     from friction_ocp.problem_file.dump import dump_problem
 
-    path = estimate.problem.path
+    path, run = estimate.problem.path, estimate.simulation
     if path is None:
         return None
     try:
-        return dump_problem(path, estimate.values, folder, estimate.simulation.max_step, estimate.problem.text)
+        return dump_problem(path, estimate.values, folder, run.max_step, estimate.problem.text, run.horizon_s)
     except FrictionOcpError:  # parameters that were added after the file was read
         return None
 

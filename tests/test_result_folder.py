@@ -137,11 +137,32 @@ def test_the_fitted_problem_is_the_problem_with_its_answer(estimate: Estimate, t
     ]
 
 
+def test_the_fitted_problem_is_judged_over_the_windows_of_the_fit(estimate: Estimate, tmp_path: Path) -> None:
+    """Other guesses make other periods: the windows of the fit are written out, unless the file states its own."""
+    windows = replace(estimate, simulation=replace(estimate.simulation, horizon_s=1.9))
+    text = fitted_problem(windows, tmp_path)
+    assert text is not None
+    assert yaml.safe_load(text)["estimation"]["horizon_s"] == 1.9
+    stated = windows.problem.text.replace("estimation:", "estimation:\n  horizon_s: 3.0")
+    text = fitted_problem(replace(windows, problem=replace(windows.problem, text=stated)), tmp_path)
+    assert text is not None
+    assert yaml.safe_load(text)["estimation"]["horizon_s"] == 3.0
+
+
 def test_a_problem_that_its_file_does_not_describe_has_no_fitted_file(estimate: Estimate, tmp_path: Path) -> None:
     """Built from parts, or given further parameters in Python: the result is written without fitted.yaml."""
     assert fitted_problem(replace(estimate, problem=replace(estimate.problem, path=None)), tmp_path) is None
     added = replace(estimate.parameters[0], name="servo.friction.load.coulomb")
     assert fitted_problem(replace(estimate, parameters=(*estimate.parameters, added)), tmp_path) is None
+
+
+@pytest.mark.parametrize("left", [0, 1])
+def test_a_run_that_broke_down_has_no_coherence(simulation: Simulation, left: int) -> None:
+    """What is simulated at the first node alone, or nowhere, is a result without coherence."""
+    whole = simulation.train[0]
+    run = replace(whole, simulated=np.where(np.arange(whole.time.size)[:, None] < left, whole.simulated, np.nan))
+    document = simulation_document(replace(simulation, train=(run,)))
+    assert document["coherence"][run.name] == {}
 
 
 def test_the_series_are_measurement_and_simulation_on_one_clock(simulation: Simulation, tmp_path: Path) -> None:

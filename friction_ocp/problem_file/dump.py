@@ -24,13 +24,15 @@ def dump_problem(
     folder: str | Path,
     max_step: float | None = None,
     text: str = "",
+    horizon_s: float | None = None,
 ) -> str:
     """Return the text of a problem file for `folder`: the file `source` with fitted values as its guesses.
 
     Bounds stay, and a prior stays where it was: its mean is written out. The value of one recording, named
     `path@recording`, becomes a `set` beside its file, the guess being left alone. Paths of recordings are written
-    relative to `folder`. `max_step` s is the integrator step that the values belong to, unless the file states one.
-    `text` is the file as it was read, if that is known: it may have changed since.
+    relative to `folder`. `max_step` s and `horizon_s` s are the integrator step and the judging windows that the values
+    belong to, unless the file states others. `text` is the file as it was read, if that is known: it may have changed
+    since.
     Comments other than those at the head are lost. Raises FrictionOcpError for a name that is
     not fitted in the file.
     """
@@ -51,8 +53,7 @@ def dump_problem(
     for path in fitted.keys() & values.keys():
         _replace_guess(fitted[path], values[path])
     rewrite_recordings(content, source, Path(folder), values)
-    if max_step is not None:
-        content["estimation"] = {"max_step": max_step} | (content.get("estimation") or {})
+    settle_estimation(content, max_step, horizon_s)
     return dump_document(content, document.head)
 
 
@@ -109,6 +110,14 @@ def _as_mapping(entry: Any) -> dict[str, Any]:
 def rewrite_recordings(content: dict[str, Any], source: Path, folder: Path, values: Mapping[str, float]) -> None:
     for kind, entries in content["recordings"].items():
         content["recordings"][kind] = [_rewritten(_as_mapping(entry), source, folder, values) for entry in entries]
+
+
+def settle_estimation(content: dict[str, Any], max_step: float | None, horizon_s: float | None) -> None:
+    """State the integrator step and the judging windows that belong to the values, unless the file states others."""
+    used = {"max_step": max_step, "horizon_s": horizon_s}
+    stated = {key: value for key, value in used.items() if value is not None}
+    if stated:
+        content["estimation"] = stated | (content.get("estimation") or {})
 
 
 def _rewritten(entry: dict[str, Any], source: Path, folder: Path, values: Mapping[str, float]) -> Any:

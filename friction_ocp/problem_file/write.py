@@ -14,7 +14,7 @@ from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Directional, Free, Tie, Value
 from friction_ocp.problem_file.document import dump_document, read_document
-from friction_ocp.problem_file.dump import rewrite_recordings
+from friction_ocp.problem_file.dump import rewrite_recordings, settle_estimation
 from friction_ocp.problem_file.salvage import copy_content
 
 _APART = ("drive", "controller", "channels", "clocks")
@@ -47,9 +47,7 @@ def write_problem(
         elif key == "drive":
             fresh |= written
     rewrite_recordings(fresh, source, Path(folder), values)
-    used = {"max_step": max_step, "horizon_s": horizon_s}
-    stated = {key: value for key, value in used.items() if value is not None}
-    fresh["estimation"] = stated | (fresh.get("estimation") or {})
+    settle_estimation(fresh, max_step, horizon_s)
     return dump_document(fresh, document.head)
 
 

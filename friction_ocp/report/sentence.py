@@ -12,7 +12,9 @@ _NAMED = 3  # channels named before the rest is counted
 
 def verdict_sentence(result: Json) -> str:
     """Say whether the solver converged, how well the free run explains the machine, and what is determined."""
-    sentences = [_status(result), _fit(part(result, "fit")), _determined(objects(result, "parameters"))]
+    sentences = [_status(result), _fit(part(result, "fit"))]
+    if result.get("status") == "converged":
+        sentences.append(_determined(objects(result, "parameters")))
     return " ".join(sentence for sentence in sentences if sentence)
 
 

@@ -335,6 +335,18 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("recordings/train", [{"file": "sweep.h5", "set": {"motor.torque_const": 1}}]),
         "recordings.train[0].set: unknown parameter 'motor.torque_const'; paths such as load.inertia; did you mean",
     ),
+    "set to a negative inertia": (
+        put("recordings/train", [{"file": "sweep.h5", "set": {"load.inertia": -1}}]),
+        "recordings.train[0].set: drive.shafts[0].inertia: inertia = -1 kg m^2; an inertia is positive",
+    ),
+    "set to no gain": (
+        put("recordings/train", [{"file": "sweep.h5", "set": {"position.gain": 0}}]),
+        "recordings.train[0].set: channels.position.gain: gain = 0; must not be zero",
+    ),
+    "set below what holds everywhere": (
+        put("recordings/train", [{"file": "sweep.h5", "set": {"load.friction.tau_s": 0.03}}]),
+        "recordings.train[0].set: drive.shafts[0].friction: tau_s = 0.03 N m is below tau_c = 0.05 N m; breakaway",
+    ),
     "process noise on nothing": (
         put("estimation", {"process_noise": {"lod": 0.1}}),
         "estimation.process_noise.lod: unknown shaft 'lod'; there are load; did you mean 'load'?",
@@ -437,6 +449,13 @@ def test_a_sign_is_wrong_in_all_recordings_or_not_at_all(workshop: Workshop) -> 
     found = [item for item in check(load_problem(path)) if "opposite signs" in item.what]
     assert [item.severity for item in found] == ["warning"]
     assert "recordings.train[1]" in found[0].where and found[0].allowed == "they agree in other recordings"
+
+
+def test_a_fault_of_the_drive_is_not_told_again_beside_a_recording(workshop: Workshop) -> None:
+    """Beside a recording stands only what its own settings make impossible."""
+    entries = [{"file": "sweep.h5", "set": {"load.friction.tau_s": 0.2}}]
+    path = workshop.problem(several(put(f"{SHAFT}/inertia", -1), put("recordings/train", entries)))
+    assert len([message for message in workshop.messages(path) if "an inertia is positive" in message]) == 1
 
 
 def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:

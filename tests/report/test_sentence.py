@@ -31,6 +31,8 @@ def test_windows_and_missing_validation_are_said() -> None:
 
 
 def test_a_failed_solve_is_no_answer() -> None:
-    """The reason comes first."""
-    sentence = verdict_sentence({"status": "not_converged", "message": "iteration limit reached."})
+    """The reason comes first, and no parameter of the last iterate is called determined."""
+    parameters = {name: {"verdict": "ok"} for name in ("a", "b")}
+    result = {"status": "not_converged", "message": "iteration limit reached.", "parameters": parameters}
+    sentence = verdict_sentence(result)
     assert sentence == "Not converged: iteration limit reached. What follows is the last iterate, not an answer."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -42,6 +42,8 @@ class Case:
     """A problem and what the rules derive from it, each only once."""
 
     problem: Problem
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Numbers by path that hold in place of those of the drive: what is `set` beside a recording."""
 
     @cached_property
     def drive(self) -> Drive:
@@ -80,7 +82,7 @@ class Case:
     @cached_property
     def numbers(self) -> Mapping[str, float]:
         """Every number of the drive by its path: known, guessed or tied; NaN where it cannot be had."""
-        values = {path: leaf.value for path, leaf in self.leaves.items()}
+        values = {path: self.settings.get(path, leaf.value) for path, leaf in self.leaves.items()}
         table = {path: _start(value) for path, value in values.items() if not isinstance(value, Tie)}
         ties = {path: value.expr for path, value in values.items() if isinstance(value, Tie)}
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -175,6 +176,20 @@ def settings_name_numbers(case: Case) -> Iterator[Finding]:
                 yield Finding(where, f"unknown parameter '{path}'", "paths such as load.inertia", closest(path, names))
 
 
+def settings_are_possible(case: Case) -> Iterator[Finding]:
+    """With what is `set` beside a recording the numbers of the drive are possible as well."""
+    known = set(_impossible_numbers(case))
+    for place, use in (*case.uses(), *case.static_uses()):
+        for finding in _impossible_numbers(Case(case.problem, use.set)) if use.set else ():
+            if finding not in known:
+                yield replace(finding, where=case.at(f"{place}.set: {finding.where.removeprefix(case.at(''))}"))
+
+
+def _impossible_numbers(case: Case) -> Iterator[Finding]:
+    for rule in (numbers_have_possible_signs, inertias_are_positive, breakaway_is_above_coulomb):
+        yield from rule(case)
+
+
 def _fitted(case: Case) -> Iterator[tuple[str, Free, str]]:
     for path, leaf in case.leaves.items():
         if isinstance(leaf.value, Free):
@@ -189,6 +204,7 @@ VALUES: tuple[Rule, ...] = (
     breakaway_is_above_coulomb,
     polylines_have_their_breaks,
     load_stribeck_has_a_speed,
+    settings_are_possible,
 )
 WHOLE: tuple[Rule, ...] = (
     load_dependence_has_a_load,
