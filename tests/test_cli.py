@@ -264,6 +264,36 @@ def test_import_writes_a_recording_in_si_units(log: Path) -> None:
     assert channels["current"].values[0] == pytest.approx(1.0)
 
 
+def test_import_does_not_write_over_what_it_reads(log: Path) -> None:
+    """The log and the map stay; a folder is no file to write to."""
+    before = log.read_bytes()
+    for out in (log, log.with_name("map.yaml"), log.parent):
+        done = run("import", log, "--map", log.with_name("map.yaml"), "--out", out)
+        assert done.status == WRONG_INPUT and str(out) in done.err
+    assert log.read_bytes() == before
+
+
+def test_what_the_system_refuses_is_told(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk, or a place where nothing can be written, is no traceback."""
+
+    def full(*_: object) -> NoReturn:
+        raise OSError(28, "No space left on device", "a.h5")
+
+    monkeypatch.setattr("friction_ocp.recording.hdf5.write_recording", full)
+    done = run("import", log, "--map", log.with_name("map.yaml"), "--out", log.with_name("a.h5"))
+    assert done.status == WRONG_INPUT and "a.h5: No space left on device" in done.err
+
+
+def test_a_reader_that_has_enough_is_no_error(log: Path) -> None:
+    """`friction-ocp ... | head` ends without a word."""
+    command = [sys.executable, "-m", "friction_ocp", "import", str(log), "--inspect"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (DONE, "")
+
+
 def test_inspecting_a_log_lists_its_columns_and_writes_nothing(log: Path) -> None:
     """--inspect needs neither map nor output."""
     before = sorted(log.parent.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from friction_ocp.cli import (
     statistics,
 )
 from friction_ocp.cli.options import DONE, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT, Parser
-from friction_ocp.errors import FrictionOcpError
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.execution.processes import LINEAR_ALGEBRA, environment
 
 __all__ = ["DONE", "INTERRUPTED", "NOT_CONVERGED", "WRONG_INPUT", "main"]
@@ -42,7 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for finding in error.findings:
             print(finding, file=sys.stderr)
         return WRONG_INPUT
-    except KeyboardInterrupt:
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to flush goes nowhere
+        return DONE
+    except OSError as error:
+        print(Finding(str(error.filename or options.command), str(error.strerror or error)), file=sys.stderr)
+        return WRONG_INPUT
+    except (KeyboardInterrupt, EOFError):
         print(f"{options.command}: interrupted", file=sys.stderr)
         return INTERRUPTED
 

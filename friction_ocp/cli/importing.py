@@ -33,6 +33,11 @@ def _import(options: argparse.Namespace) -> int:
         raise FrictionOcpError(
             [Finding("import", f"--{name} is missing", remedy="see friction-ocp import --help") for name in missing]
         )
+    for given in (options.file, options.map):
+        if options.out.resolve() == given.resolve():
+            raise FrictionOcpError(Finding(str(options.out), "--out is what is read", remedy="give another --out"))
+    if options.out.is_dir():
+        raise FrictionOcpError(Finding(str(options.out), "this is a folder", "a file, such as log.h5"))
     found = import_file(options.file, options.map)
     if isinstance(found, Recording):
         write_recording(found, options.out)

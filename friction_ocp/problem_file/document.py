@@ -90,6 +90,9 @@ def read_document(path: Path, text: str | None = None) -> Document:
         raise FrictionOcpError(Finding(where, f"this is not YAML: {' '.join(str(error).split())}")) from error
     except RecursionError as error:
         raise FrictionOcpError(Finding(where, "this is nested too deeply")) from error
+    except (ValueError, KeyError, AttributeError, OverflowError) as error:
+        what = "a value is not what its tag says, or no possible date"
+        raise FrictionOcpError(Finding(where, what, remedy="leave tags out, or quote the value")) from error
     return Document(path, content, head_comment(text), text)
 
 

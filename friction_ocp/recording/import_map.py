@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -80,6 +81,9 @@ def load_import_map(path: str | Path) -> ImportMap:
         raise FrictionOcpError(Finding(where, "this is nested too deeply")) from error
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise FrictionOcpError(Finding(where, f"this is not YAML ({' '.join(str(error).split())})")) from error
+    except (ValueError, KeyError, AttributeError, OverflowError) as error:
+        what = "a value is not what its tag says, or no possible date"
+        raise FrictionOcpError(Finding(where, what, remedy="leave tags out, or quote the value")) from error
     reader = _MapReader(where)
     result = reader.read(content)
     if result is None or reader.findings:
@@ -177,8 +181,9 @@ class _MapReader:
         return Column(name, **cast(dict[str, Any], texts | numbers), time=time)
 
     def number(self, place: str, content: object) -> float | None:
-        if isinstance(content, int | float) and not isinstance(content, bool) and math.isfinite(content):
-            return float(content)
+        with suppress(OverflowError):
+            if isinstance(content, int | float) and not isinstance(content, bool) and math.isfinite(content):
+                return float(content)
         self.report(place, f"this is {_kind(content)}", "a number")
         return None
 

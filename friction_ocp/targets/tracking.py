@@ -56,7 +56,7 @@ def tracking_gain(fitted: Fitted) -> tuple[Tracking, ...]:
     name, unit = feedback
     column = list(fitted.simulation.units).index(name)
     runs = fitted.runs()
-    most = MOST_NODES // len(runs)
+    most = MOST_NODES // max(len(runs), 1)
     return tuple(_tracking(fitted, run, unit, column, most) for run in runs)
 
 

@@ -602,6 +602,8 @@ def test_all_findings_come_at_once(workshop: Workshop) -> None:
 TEXTS = {
     "tab": ("a:\n\t- 1\n", "this is not YAML: line 2, column 1"),
     "twice": ("title: a\nchannels: {x: 1, x: 2}\ntitle: b\n", "line 3: key 'title' stands here again, first in line 1"),
+    "tag": ("title: !!int x\n", "a value is not what its tag says, or no possible date; leave tags out"),
+    "date": ("title: 2026-13-01x\nlimits: !!timestamp 2026-13-01\n", "a value is not what its tag says"),
     "python": ("format: !!python/name:os.system\n", "this is not YAML: line 1"),
     "list": ("- 1\n", "this is not a problem file"),
     "bomb": (

@@ -15,6 +15,8 @@ from friction_ocp.recording.hdf5 import read_recording, write_recording
 from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
 from friction_ocp.recording.import_recording import import_recording, inspect_file
 from friction_ocp.recording.listing import list_signals
+from friction_ocp.recording.recording import Recording
+from friction_ocp.recording.table import recording_of
 
 MAP = """
 format: friction-ocp-map/1
@@ -38,6 +40,12 @@ def faults(path: Path, content: str, import_map: str = MAP) -> str:
     with pytest.raises(FrictionOcpError) as caught:
         import_recording(put(path, content), put(path.with_suffix(".yaml"), import_map))
     return str(caught.value)
+
+
+def read_csv(path: Path, import_map: ImportMap) -> Recording:
+    """Return the mapped columns of delimited text as a recording."""
+    with open_csv(path, import_map) as file:
+        return recording_of(file, import_map, path)
 
 
 @pytest.mark.parametrize(("suffix", "delimiter"), [("csv", ","), ("csv", ";"), ("tsv", "\t"), ("txt", ", ")])
