@@ -13,7 +13,7 @@ SECONDS_BETWEEN_LINES = 2.0
 
 
 def add_commands(commands: Any) -> None:
-    """Add `diagnose` to the parser."""
+    """Add `diagnose` and `design` to the parser."""
     add_job(commands, "diagnose", "where the gap lies, what causes it, how far it shrinks", _diagnose)
     add_workers(commands.choices["diagnose"])
     add_job(commands, "design", "a motion within limits that separates candidates or sharpens parameters", _design)

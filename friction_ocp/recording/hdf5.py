@@ -1,4 +1,4 @@
-"""HDF5 files: recordings, static points and the series of a result; the only module that imports h5py."""
+"""HDF5 files: recordings, static points and the series of a result; what MATLAB writes is in `matlab_hdf5`."""
 
 from __future__ import annotations
 
