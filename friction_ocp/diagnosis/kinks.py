@@ -18,16 +18,17 @@ from friction_ocp.diagnosis.polishing import (
     joined,
     worthwhile,
 )
-from friction_ocp.estimation.detours import DETOURS, sharpened
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.splicing import spliced
 
+DETOURS = (0.02, 0.004, 0.0008, 0.00016)
+"""Smoothing of the sign over the typical speed on the way around kinks, and back step by step: in one step, nodes that
+wide smoothing has moved are caught at kinks that are not theirs."""
 HARDLY = (0.0005, 0.0002)
-"""Smoothing of the sign over the typical speed for the nodes alone: an accelerometer sees every change of the sign, and
-wide smoothing leads astray."""
+"""The same for the nodes alone: an accelerometer sees every change of the sign, and wide smoothing leads astray."""
 NODE_STEPS = 8
 
 
@@ -80,5 +81,7 @@ def _with_better(program: Program, point: Point, other: Point) -> Point:
 
 def around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:
     """Solve again from where friction with a smoothed sign leads to, less and less of it."""
-    point = sharpened(model, program, point, DETOURS, COARSE)[-1].point
+    for width in DETOURS:
+        rounded = replace(program, width=width * model.speed_scale)
+        point = solve_gauss_newton(rounded, point, COARSE).point
     return solve_gauss_newton(program, point, limits)

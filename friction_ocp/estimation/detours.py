@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
-from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
+from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
@@ -18,13 +17,8 @@ from friction_ocp.estimation.stages import ROUNDINGS, keeps_the_loss, mean_error
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
 
-SOFTER = (0.05, 0.01, 0.0025)
-"""Smoothing of the sign over the typical speed on the way back from a restart under a loss with kinks."""
-DETOURS = (0.02, 0.004, 0.0008, 0.00016)
-"""The same on the way around kinks of exact friction, and back step by step: in one step, nodes that wide smoothing has
-moved are caught at kinks that are not theirs."""
-FIRST_DETOUR = (0.05,)
-"""What is tried before: an end that is smooth by itself needs no more."""
+DETOURS = (0.05, 0.01, 0.0025)
+"""Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
 HOPS = (0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks, in turn: by what share the quadratic model calls them worse."""
 BETTER = 1e-6
@@ -53,34 +47,16 @@ def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     Between two kinks there may be an end that is smooth by itself, and near the best one: one detour is always made.
     """
     program, best = fitted.program, fitted.solution
-    if not isinstance(program.loss, Squares):
-        return fitted
-    for widths in (FIRST_DETOUR, DETOURS):
-        watch = phases.begin(f"detour, smoothing {widths[0]:g}")
-        between = sharpened(model, program, best.point, widths, COARSE, watch)
-        end = final_solver(model)(program, between[-1].point, limits(model), watch)
-        iterations = sum(solution.iterations for solution in (best, *between, end))
-        best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
-        if best.smooth:
+    for number, width in enumerate(DETOURS):
+        if (number > 0 and best.smooth) or not isinstance(program.loss, Squares):
             break
-    return replace(fitted, solution=best)
-
-
-def sharpened(
-    model: Model,
-    program: Program,
-    point: Point,
-    widths: Sequence[float],
-    tolerances: Tolerances,
-    watch: Watch | None = None,
-) -> list[Solution]:
-    """Solve a program with its friction smoothed from a point, width by width; return the ends."""
-    ends: list[Solution] = []
-    for width in widths:
+        watch = phases.begin(f"detour, smoothing {width:g}")
         rounded = replace(program, width=width * model.speed_scale)
-        ends.append(solve_gauss_newton(rounded, point, tolerances, watch))
-        point = ends[-1].point
-    return ends
+        between = solve_gauss_newton(rounded, best.point, COARSE, watch)
+        end = final_solver(model)(program, between.point, limits(model), watch)
+        iterations = best.iterations + between.iterations + end.iterations
+        best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
+    return replace(fitted, solution=best)
 
 
 def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
@@ -93,7 +69,7 @@ def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     rng, size = np.random.default_rng(model.problem.estimation.seed), mean_error(program, best.point)
     softer = [
         replace(program, loss=Absolute(rounding * size), width=width * model.speed_scale)
-        for rounding, width in zip(ROUNDINGS[2:-1], SOFTER, strict=True)
+        for rounding, width in zip(ROUNDINGS[2:-1], DETOURS, strict=True)
     ]
     failed, known = 0, [list[Solution]() for _ in softer]
     for k in range(tries.most):
