@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.cli.options import DONE
+from friction_ocp.cli.options import DONE, refuse_overwriting
 from friction_ocp.errors import Finding, FrictionOcpError
 
 
@@ -33,6 +33,7 @@ def _import(options: argparse.Namespace) -> int:
         raise FrictionOcpError(
             [Finding("import", f"--{name} is missing", remedy="see friction-ocp import --help") for name in missing]
         )
+    refuse_overwriting(options.out, (options.file, options.map, *options.file.glob("*")))
     found = import_file(options.file, options.map)
     if isinstance(found, Recording):
         write_recording(found, options.out)
