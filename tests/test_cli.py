@@ -314,6 +314,16 @@ def test_import_says_what_is_missing(log: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["log.csv", "map.yaml"])
+def test_import_writes_over_nothing_that_it_reads(log: Path, name: str) -> None:
+    """Log and map are left as they are, however --out spells them."""
+    kept, before = log.with_name(name), log.with_name(name).read_bytes()
+    ran = run("import", log, "--map", log.with_name("map.yaml"), "--out", log.parent / "." / name)
+    assert ran.status == WRONG_INPUT
+    assert ran.err.startswith(f"{kept}: --out is a file that this command reads")
+    assert kept.read_bytes() == before
+
+
 class _Terminal(StringIO):
     def isatty(self) -> bool:
         return True

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.cli.options import DONE
+from friction_ocp.cli.options import DONE, refuse_overwriting
 from friction_ocp.errors import FrictionOcpError
 
 DEAR = 0.1
@@ -26,11 +26,13 @@ def add_commands(commands: Any) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     from friction_ocp.targets.export import export
-    from friction_ocp.targets.fitted import load_fitted
+    from friction_ocp.targets.fitted import files_of, load_fitted
     from friction_ocp.targets.price import judged_by, price_text
     from friction_ocp.targets.tracking import tracking_gain, tracking_text
 
     fitted = load_fitted(options.result)
+    for written in (options.out, options.out.with_suffix(".h")) if options.to == "c" else (options.out,):
+        refuse_overwriting(written, files_of(fitted))
     exported = export(fitted, options.to, options.out)
     for path in exported.files:
         print(f"Written: {path}")

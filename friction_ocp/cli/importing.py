@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from friction_ocp.cli.options import DONE
+from friction_ocp.cli.options import DONE, refuse_overwriting
 from friction_ocp.errors import Finding, FrictionOcpError
 
 
@@ -33,11 +33,9 @@ def _import(options: argparse.Namespace) -> int:
         raise FrictionOcpError(
             [Finding("import", f"--{name} is missing", remedy="see friction-ocp import --help") for name in missing]
         )
-    for given in (options.file, options.map):
-        if options.out.resolve() == given.resolve():
-            raise FrictionOcpError(Finding(str(options.out), "--out is what is read", remedy="give another --out"))
     if options.out.is_dir():
         raise FrictionOcpError(Finding(str(options.out), "this is a folder", "a file, such as log.h5"))
+    refuse_overwriting(options.out, (options.file, options.map, *options.file.glob("*")))
     found = import_file(options.file, options.map)
     if isinstance(found, Recording):
         write_recording(found, options.out)

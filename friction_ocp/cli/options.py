@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -67,6 +67,13 @@ def output_folder(options: argparse.Namespace, of: str = "") -> Path:
     if not os.access(there, os.W_OK):
         raise FrictionOcpError(Finding(str(folder), f"{there} may not be written to", remedy="give another --out"))
     return folder
+
+
+def refuse_overwriting(out: Path, sources: Iterable[Path]) -> None:
+    """Refuse to write over a file from which a command reads, or that belongs to what it reads."""
+    if out.exists() and any(source.exists() and out.samefile(source) for source in sources):
+        what = "--out is a file that this command reads, or a part of the result that it reads, and would be lost"
+        raise FrictionOcpError(Finding(str(out), what, remedy="give another --out"))
 
 
 def checked(options: argparse.Namespace) -> Problem:

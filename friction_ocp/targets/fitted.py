@@ -28,6 +28,8 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 
 PROBLEMS = ("fitted.yaml", "augmented.yaml", "base.yaml")
 """Files of a result folder that hold a drive, the best first."""
+RESULTS = ("result.json", "result.h5", "report.html", "next_experiment.h5")
+"""Further files of a result folder."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,15 @@ def result_document(fitted: Fitted) -> Mapping[str, Any]:
     except (OSError, ValueError):
         return {}
     return cast(dict[str, Any], content) if isinstance(content, dict) else {}
+
+
+def files_of(fitted: Fitted) -> tuple[Path, ...]:
+    """Return the files from which a fitted drive was read, and those that belong to its result."""
+    folder, problem = fitted.source.parent, fitted.model.problem
+    read = [use.recording.path for use in problem.recordings]
+    read += [use.points.path for use in (*problem.static, *problem.static_validation)]
+    beside = [folder / name for name in (*PROBLEMS, *RESULTS)] if (folder / "result.json").is_file() else []
+    return (fitted.source, *beside, *(path for path in read if path is not None))
 
 
 def both_ways(value: Any) -> tuple[float, float]:

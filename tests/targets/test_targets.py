@@ -119,6 +119,32 @@ def test_what_cannot_be_expressed_is_named(
     assert f"Left out: {expected}" in (tmp_path / "a.xml").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("to", "out", "kept"), [("table", "fitted.yaml", "fitted.yaml"), ("c", "a.c", "a.h")])
+def test_an_export_writes_over_nothing_that_it_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str, out: str, kept: str
+) -> None:
+    """The problem of a result stays as it is, also where only the header beside the source has its name."""
+    path = axis(tmp_path).rename(tmp_path / kept)
+    source = path if path.suffix == ".yaml" else tmp_path / "axis.yaml"
+    if source != path:
+        source.symlink_to(path)
+    before = path.read_bytes()
+    assert main(["export", str(source), "--to", to, "--out", str(tmp_path / out), "--no-price"]) == WRONG_INPUT
+    assert capsys.readouterr().err.startswith(f"{path}: --out is a file that this command reads")
+    assert path.read_bytes() == before
+
+
+def test_an_export_leaves_the_other_files_of_a_result_alone(tmp_path: Path) -> None:
+    """Beside fitted.yaml, result.json cannot be the name of an export; a new name in the folder can."""
+    path = axis(tmp_path).rename(tmp_path / "fitted.yaml")
+    (tmp_path / "result.json").write_text("{}", encoding="utf-8")
+    command = ["export", str(path), "--to", "table", "--no-price", "--out"]
+    assert main([*command, str(tmp_path / "result.json")]) == WRONG_INPUT
+    assert (tmp_path / "result.json").read_text(encoding="utf-8") == "{}"
+    assert main([*command, str(tmp_path / "table.csv")]) == DONE
+    assert main([*command, str(tmp_path / "table.csv")]) == DONE
+
+
 def test_the_price_of_what_is_lost_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A servo whose friction grows with its load is told to be dear in MJCF."""
     path = servo(tmp_path, "load_dependent")
