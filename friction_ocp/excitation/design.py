@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Literal
@@ -14,7 +14,7 @@ from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.refit import completed, quick_refit
-from friction_ocp.diagnosis.screen import screen
+from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare_fit
@@ -86,9 +86,20 @@ def design(
     if wrong:
         raise FrictionOcpError(wrong)
     clues, blocks = clues_of(base), blocks_of(base.linear.rows)
-    seen = [screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)]
-    rivals = [completed(quick_refit(base, item)) for item in seen if item is not None and item.starts]
+    seen = {key: screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)}
+    rivals = [completed(quick_refit(base, item)) for item in _begun(seen)]
     return replace(separating(base, rivals, tell), between=tuple(between))
+
+
+def _begun(seen: Mapping[Key, Screened | None]) -> list[Screened]:
+    """Return the candidates that a refit can begin with; raises FrictionOcpError where fewer than two are left."""
+    begun = [item for item in seen.values() if item is not None and item.starts]
+    if len(begun) < 2:
+        what, remedy = "the recordings give no size to begin with", "name others, or design without --between first"
+        allowed = "two or more candidates that the recordings hint at"
+        left = [key for key, item in seen.items() if item is None or not item.starts]
+        raise FrictionOcpError([Finding(f"--between {name}@{place}", what, allowed, remedy) for name, place in left])
+    return begun
 
 
 def _nearest(name: str, known: Sequence[Key]) -> str:

@@ -185,7 +185,7 @@ def _looped(fitted: FittedModel, drive: Drive, limits: Limits) -> Drive:
     slowest = slowest if np.isfinite(slowest) else 0.0
     rate = 2.0 * np.pi / max(SLOWER_THAN_MODES * slowest, SLOWER_THAN_SAMPLES * step)
     gain = _inertia(fitted) * rate * per_torque[kind]
-    most = limits.torque * per_torque[kind]
+    most = limits.torque * abs(per_torque[kind])
     loop = Controller("pi_velocity", f"{LED}omega", kind, kp=gain, ki=0.25 * gain * rate, saturation=(-most, most))  # pyright: ignore[reportArgumentType]
     recorded = replace(command, role="output", noise_std=1.0)
     channels = tuple(recorded if item is command else item for item in drive.channels)

@@ -112,6 +112,28 @@ def test_candidates_that_there_are_not_are_named(path: Path) -> None:
         design(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)
 
 
+def test_candidates_that_the_recordings_hardly_show_are_named(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Candidates without a size to begin with are refused, not sought among no motions."""
+    monkeypatch.setattr("friction_ocp.excitation.design.screen", lambda *arguments: None)
+    with pytest.raises(FrictionOcpError) as caught:
+        design(load_problem(path), "D", [("stribeck", "motor"), ("asymmetry", "motor")], silent)
+    assert [finding.where for finding in caught.value.findings] == [
+        "--between stribeck@motor",
+        "--between asymmetry@motor",
+    ]
+    assert caught.value.findings[0].what == "the recordings give no size to begin with"
+
+
+def test_a_current_of_the_other_sign_is_led_as_well(path: Path, tmp_path: Path) -> None:
+    """A negative torque constant leaves a current within the limits, and the same motions."""
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["motor"]["torque_constant"] *= -1.0
+    document["channels"]["current"]["gain"] = -1.0
+    document["recordings"] = {"train": [str(path.parent / "a.h5"), str(path.parent / "b.h5")]}
+    (tmp_path / "turned.yaml").write_text(yaml.safe_dump(document), encoding="utf-8")
+    assert len(design(load_problem(tmp_path / "turned.yaml"), "D", [], silent).options) >= 6
+
+
 def test_a_motion_that_is_an_input_is_not_designed() -> None:
     """The telescope whose motors are led by their speed has no command that a design could change."""
     problem = load_problem(REPOSITORY / "problems" / "lto" / "joint.yaml")
