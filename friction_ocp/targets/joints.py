@@ -17,6 +17,7 @@ from friction_ocp.drive.parts import Drive, Motion, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.friction.static import Coulomb, CoulombViscous, NoFriction, Viscous
+from friction_ocp.parameters import is_off
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.targets.fitted import Fitted, both_ways
 
@@ -48,7 +49,7 @@ class Joint:
     motion: Motion
     inertia: float
     armature: float
-    """Inertia of the other shafts of the group, reflected."""
+    """Inertia of the other shafts of the group, reflected; 0 where it is all the inertia that there is."""
     damping: float
     friction: float
     """Coulomb friction."""
@@ -114,6 +115,8 @@ def joint_drive(fitted: Fitted, elastic: bool = True) -> JointDrive:
         for motor in drive.motors
         if signals[motor.name]
     )
+    late = [item for item in fitted.model.problem.drive.motors if not is_off(item.dead_time)]
+    losses += [Loss(f"{item.name}.dead_time", "left out") for item in late]
     losses += [loss for item in drive.transmissions for loss in _transmission_losses(item)]
     return JointDrive(joints, springs, actuators, tuple(losses))
 
@@ -147,13 +150,15 @@ def _joint(drive: Drive, structure: Topology, group: int, top: dict[str, float],
     gravity = None
     if chosen.gravity is not None and chosen.motion == "rotary":
         gravity = (float(chosen.gravity.torque), float(chosen.gravity.phase))
+    own = float(chosen.inertia)
+    reflected = sum(float(shaft.inertia) * ratio[shaft.name] ** 2 for shaft in shafts if shaft is not chosen)
     return Joint(
         name=chosen.name,
         group=group,
         speed=scale,
         motion=chosen.motion,
-        inertia=float(chosen.inertia),
-        armature=sum(float(shaft.inertia) * ratio[shaft.name] ** 2 for shaft in shafts if shaft is not chosen),
+        inertia=own or reflected,  # no program takes a body without inertia
+        armature=reflected if own else 0.0,
         damping=damping,
         friction=friction,
         gravity=gravity,

@@ -15,6 +15,7 @@ import numpy as np
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_command, motor_torque
 from friction_ocp.drive.stepping import recorded, state_symbols
+from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.optional_library import optional_library
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
 from friction_ocp.targets.fitted import Fitted, Run, flat
@@ -44,13 +45,22 @@ class MuJoCoRun:
 
     def __init__(self, fitted: Fitted, drive: JointDrive, text: str, by_torque: bool) -> None:
         self._mujoco = mujoco_library(str(fitted.source))
-        self._model = self._mujoco.MjModel.from_xml_string(text)
+        self._model = self._loaded(fitted, text)
         self._fitted, self._drive, self._by_torque = fitted, drive, by_torque
         self._mech = fitted.model.drive.mechanism
         self._functions = _functions(self._mech)
         self._address = [int(self._model.joint(joint.name).qposadr[0]) for joint in drive.joints]
         self._dof = [int(self._model.joint(joint.name).dofadr[0]) for joint in drive.joints]
         self._own = bool(self._mech.extra_names or self._mech.lagging or self._mech.memory_names)
+
+    def _loaded(self, fitted: Fitted, text: str) -> Any:
+        try:
+            return self._mujoco.MjModel.from_xml_string(text)
+        except ValueError as error:
+            what = f"MuJoCo refuses the model ({' '.join(str(error).split())})"
+            raise FrictionOcpError(
+                Finding(str(fitted.source), what, remedy="correct the numbers of the fit")
+            ) from error
 
     @property
     def model(self) -> Any:

@@ -52,6 +52,32 @@ def test_mujoco_adds_next_to_nothing_to_coulomb_and_viscous_friction(tmp_path: P
     assert "sin_sin-kp400" in price_text(rows, "MuJoCo")
 
 
+@pytest.mark.parametrize("gravity", [{"torque": 4.0, "phase": 0.4}, None])
+def test_a_shaft_without_inertia_gets_that_of_its_neighbour(tmp_path: Path, gravity: dict[str, float] | None) -> None:
+    """The rotor's inertia times the square of the ratio is that of the body, and no armature is left."""
+    changes: dict[str, Any] = {"drive__shafts__1__inertia": 0.0, "drive__shafts__1__gravity": gravity}
+    model, data = in_mujoco(load_fitted(axis(tmp_path, **changes)))
+    mujoco.mj_forward(model, data)
+    assert float(data.M[0]) == pytest.approx(0.002 * 400.0, rel=1e-9)
+    assert model.dof_armature[0] == 0.0
+
+
+def test_a_model_that_mujoco_refuses_is_a_finding(tmp_path: Path) -> None:
+    """What MuJoCo says is told with the file of the drive."""
+    fitted = load_fitted(axis(tmp_path))
+    with pytest.raises(FrictionOcpError, match=r"axis.yaml: MuJoCo refuses the model"):
+        MuJoCoRun(
+            fitted, joint_drive(fitted), "<mujoco><worldbody><body name='a'><joint/></body></worldbody></mujoco>", False
+        )
+
+
+def test_a_dead_time_cannot_be_expressed(tmp_path: Path) -> None:
+    """A joint model acts at once: the dead time of the motor is a loss that is named."""
+    motor = {"torque_constant": 0.5, "dead_time": 0.008}
+    losses = joint_drive(load_fitted(axis(tmp_path, drive__motor=motor))).losses
+    assert [loss.term for loss in losses] == ["motor.dead_time"]
+
+
 @pytest.mark.parametrize("angle", [-2.0, 0.0, 1.3])
 def test_inertia_gravity_and_actuator_are_those_of_the_drive(tmp_path: Path, angle: float) -> None:
     """Through a ratio of -20: the inertia of the rotor times 400, its friction times 20, torque with its sign."""
