@@ -182,6 +182,7 @@ def comparison_document(found: Comparison) -> dict[str, Any]:
                     "added": item.added,
                     "statistic": item.statistic,
                     "p_value": item.p_value,
+                    "at_bound": list(item.at_bound),
                 }
                 for item in found.ratios
             ],
@@ -209,6 +210,7 @@ def _model(item: Candidate, among: Sequence[Candidate]) -> dict[str, Any]:
         "aicc": number(scores.aicc),
         "bic": scores.bic,
         "held_out": scores.held_out,
+        "behind": None if item.behind is None else {"held_out": item.behind.difference, "chance": item.behind.chance},
         "delta_aicc": number(scores.aicc - min(other.aicc for other in others)),
         "delta_bic": scores.bic - min(other.bic for other in others),
         "train": document["fit"]["train"],

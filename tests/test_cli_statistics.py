@@ -21,7 +21,7 @@ COMMANDS = {
     "multistart": (["--starts", "2"], "waterfall", "starts reach the best optimum"),
     "profile": (["--parameter", "servo.friction.tau_c"], "profiles", "finite likelihood interval"),
     "bootstrap": (["--draws", "20"], "bootstrap", "draws scatter by"),
-    "compare": ([], "comparison", "is best by held-out likelihood"),
+    "compare": ([], "comparison", "by held-out likelihood"),
 }
 
 

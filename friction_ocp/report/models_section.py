@@ -33,7 +33,7 @@ def models_section(found: Json, result: Json) -> StatisticSection:
 
 def _sentence(models: Sequence[Json], ranked_by: str) -> str:
     best = str(models[0]["name"])
-    text = f"{best} is best by {_CRITERIA[ranked_by]}"
+    text = _tie(models) or f"{best} is best by {_CRITERIA[ranked_by]}"
     others = {word: _least(models, key) for word, key in (("AICc", "delta_aicc"), ("BIC", "delta_bic"))}
     if ranked_by == "aicc":
         others.pop("AICc")
@@ -41,6 +41,20 @@ def _sentence(models: Sequence[Json], ranked_by: str) -> str:
         words = " and ".join(word for word, least in others.items() if least == name)
         text += f"; {'so it' if name == best else name} is by {words}"
     return f"{text}."
+
+
+def _tie(models: Sequence[Json]) -> str:
+    """Return which models nothing but chance parts from the best by held-out likelihood, and which is preferred."""
+    parted = {str(model["name"]): part(model, "behind") for model in models if model.get("behind")}
+    tied = {name: lead for name, lead in parted.items() if float(lead["held_out"]) <= float(lead["chance"])}
+    if len(tied) < 2:
+        return ""
+    widest = max(tied.values(), key=lambda lead: float(lead["held_out"]))
+    lead, chance = (significant(widest[key], 2) for key in ("held_out", "chance"))
+    return (
+        f"{listed(tied)} tie by held-out likelihood (a lead of {lead}, where chance alone reaches {chance} at 95 %), "
+        f"and {next(iter(tied))} is preferred as the simplest"
+    )
 
 
 def _least(models: Sequence[Json], key: str) -> str:
@@ -71,7 +85,8 @@ def _tests(tests: Sequence[Json]) -> tuple[StatisticTable, ...]:
         return ()
     caption = (
         "Likelihood ratio of nested models: a small p-value says that the recordings need the general one. The ratio "
-        "is scaled for residuals that are not white."
+        "is of what was fitted, which may be short predictions, not of the free run, and is scaled for residuals that "
+        "are not white."
     )
     cells = tuple(
         (

@@ -16,7 +16,8 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.statistics.answer import answer
 from friction_ocp.statistics.execution import Execution
-from friction_ocp.statistics.nesting import LikelihoodRatio, likelihood_ratios
+from friction_ocp.statistics.lead import Lead, held_out_lead
+from friction_ocp.statistics.nesting import NOT_WORSE, LikelihoodRatio, likelihood_ratios
 from friction_ocp.statistics.scores import Scores, effective_samples, scores_of
 from friction_ocp.statistics.workshop import Workshop
 
@@ -30,6 +31,8 @@ class Candidate:
     name: str
     estimate: Estimate
     scores: Scores
+    behind: Lead | None = None
+    """Lead of the model with the best held-out likelihood over this one."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Comparison:
     """Models of the same recordings, best first."""
 
     candidates: tuple[Candidate, ...]
+    """The first is the one with fewest parameters among those that no more than chance parts from the best."""
     ranked_by: Criterion
     """`held_out` likelihood where there are validation recordings or points, else `aicc`."""
     effective_samples: Mapping[str, float]
@@ -67,10 +71,10 @@ def compare(
     ]
     unseen = problems[0].validation or problems[0].static_validation
     criterion: Criterion = "held_out" if unseen else "aicc"
-    order = sorted(range(len(found)), key=lambda k: _rank(candidates[k].scores, criterion))
-    ratios = likelihood_ratios([(names[k], found[k]) for k in order], nested)
-    ranked = tuple(candidates[k] for k in order)
-    return Comparison(ranked, criterion, sizes, ratios, _warnings(ranked, ratios))
+    ranked = _preferred_first(sorted(candidates, key=lambda item: _rank(item.scores, criterion)), criterion, sizes)
+    fits = dict(zip(names, found, strict=True))
+    ratios = likelihood_ratios([(item.name, fits[item.name]) for item in ranked], nested)
+    return Comparison(ranked, criterion, sizes, ratios, (*_warnings(ranked, ratios), *_doubts(ranked, ratios, sizes)))
 
 
 def names_of(problems: Sequence[Problem]) -> list[str]:
@@ -86,6 +90,19 @@ def names_of(problems: Sequence[Problem]) -> list[str]:
 
 def _rank(scores: Scores, criterion: Criterion) -> float:
     return scores.aicc if criterion == "aicc" or scores.held_out is None else -scores.held_out
+
+
+def _preferred_first(
+    ranked: Sequence[Candidate], criterion: Criterion, sizes: Mapping[str, float]
+) -> tuple[Candidate, ...]:
+    """Return the models with the simplest first of those that tie with the best by held-out likelihood."""
+    if criterion != "held_out":
+        return tuple(ranked)
+    best = ranked[0].estimate
+    led = [replace(item, behind=held_out_lead(best, item.estimate, sizes)) for item in ranked]
+    tied = [item for item in led if item.behind is not None and item.behind.tied]
+    simplest = min(tied, key=lambda item: item.scores.parameters)
+    return (simplest, *(item for item in led if item is not simplest))
 
 
 def _alike(problems: Sequence[Problem], names: Sequence[str]) -> list[Problem]:
@@ -171,5 +188,28 @@ def _warnings(ranked: Sequence[Candidate], ratios: Sequence[LikelihoodRatio]) ->
         f"{item.general} contains {item.special} and ended worse: its fit is not at its optimum. Run multistart on it."
         for item in ratios
         if item.statistic is None and item.added > 0
+    ]
+    return tuple(texts)
+
+
+def _doubts(
+    ranked: Sequence[Candidate], ratios: Sequence[LikelihoodRatio], sizes: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Return why likelihood ratios are not to be believed."""
+    scores, count = {item.name: item.scores for item in ranked}, sum(sizes.values())
+    tested = [item for item in ratios if item.statistic is not None]
+    texts = [
+        f"{item.general} contains {item.special}, but its free run is less likely (log-likelihood "
+        f"{scores[item.general].log_likelihood:.4g} to {scores[item.special].log_likelihood:.4g}): do not go by the "
+        f"p-value of their ratio, which compares what was fitted. Run multistart on {item.general}, or state "
+        "estimation.fit: simulation in both."
+        for item in tested
+        if scores[item.general].log_likelihood < scores[item.special].log_likelihood - 0.5 * NOT_WORSE * count
+    ]
+    texts += [
+        f"{item.general} adds {', '.join(item.at_bound)} to {item.special}, at its bound: the p-value of their ratio "
+        "does not hold there. Widen the bound, or fix the parameter, and compare again."
+        for item in tested
+        if item.at_bound
     ]
     return tuple(texts)

@@ -36,6 +36,8 @@ class LikelihoodRatio:
     """Twice the fall of the objective over its scale under misfit; None where the general fit ended worse."""
     p_value: float | None
     """Probability of a larger statistic if the special case is true."""
+    at_bound: tuple[str, ...] = ()
+    """Added parameters that ended at a bound: the statistic is not distributed as chi2 then."""
 
 
 def likelihood_ratios(
@@ -97,4 +99,5 @@ def _ratio(special: tuple[str, Answer], general: tuple[str, Answer], told: bool)
     tail = stats.chi2.sf(statistic, difference)
     if np.isfinite(freedom):
         tail = stats.f.sf(statistic / difference, difference, freedom)
-    return LikelihoodRatio(special[0], general[0], told, difference, statistic, float(tail))
+    stuck = tuple(general[1].workshop.model.space.names[k] for k in added if doubt.at_bound[k])
+    return LikelihoodRatio(special[0], general[0], told, difference, statistic, float(tail), stuck)

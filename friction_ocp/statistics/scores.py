@@ -33,8 +33,8 @@ class Errors:
 
     series: tuple[FloatArray, ...]
     """Of training, each in the order of time where there is one; NaN where a sample is missing."""
-    unseen: FloatArray
-    """Of validation recordings or points."""
+    unseen_series: tuple[FloatArray, ...]
+    """Of validation recordings or points, likewise."""
     correlated: bool = True
     """Whether neighbours within a series may be."""
 
@@ -42,6 +42,11 @@ class Errors:
     def train(self) -> FloatArray:
         """All errors of training."""
         return _told(self.series)
+
+    @cached_property
+    def unseen(self) -> FloatArray:
+        """All errors of validation."""
+        return _told(self.unseen_series)
 
     @property
     def independent(self) -> float:
@@ -57,14 +62,14 @@ def errors_of(simulation: Simulation) -> Mapping[str, Errors]:
             tuple(run.simulated[:, column] - run.measured[:, column] for run in runs)
             for runs in (simulation.train, simulation.validation)
         )
-        found[name] = Errors(train, _told(unseen))
+        found[name] = Errors(train, unseen)
     for effort in dict.fromkeys(item.effort for item in simulation.static):
         sets = [item for item in simulation.static if item.effort == effort]
         scaled = {item.name: (item.predicted - item.measured) / item.std_error for item in sets}
         train, unseen = (
             tuple(scaled[item.name] for item in sets if item.split == split) for split in ("train", "validation")
         )
-        found[f"{effort} of static points"] = Errors(train, _told(unseen), correlated=False)
+        found[f"{effort} of static points"] = Errors(train, unseen, correlated=False)
     return {name: item for name, item in found.items() if item.train.size}
 
 
@@ -108,6 +113,30 @@ def scores_of(estimate: Estimate, sizes: Mapping[str, float]) -> Scores:
     )
 
 
+@dataclass(frozen=True)
+class Densities:
+    """Log densities of samples that were held out; their sum is the held-out log-likelihood."""
+
+    values: FloatArray
+    """(samples,) each times the share of a sample that is independent; 0 where a sample is missing."""
+    correlated: bool
+
+
+def held_out_densities(estimate: Estimate, sizes: Mapping[str, float]) -> tuple[Densities, ...]:
+    """Return the log densities of recordings, summed over channels, and of static points by kind."""
+    laplace = estimate.problem.estimation.loss != "squares"
+    found: list[Densities] = []
+    for name, item in errors_of(estimate.simulation).items():
+        if name not in sizes or not item.unseen.size:
+            continue
+        density = _log_density(np.concatenate(item.unseen_series), _spread(item.train, laplace), laplace)
+        values = np.where(np.isfinite(density), density, 0.0) * sizes[name] / item.train.size
+        found.append(Densities(values, item.correlated))
+    channels = [item.values for item in found if item.correlated]
+    points = [item for item in found if not item.correlated]
+    return (*([Densities(np.sum(channels, axis=0), True)] if channels else []), *points)
+
+
 def _spread(errors: FloatArray, laplace: bool) -> float:
     size = float(np.mean(np.abs(errors))) if laplace else float(np.sqrt(np.mean(errors**2)))
     return max(size, 1e-300)
@@ -115,6 +144,10 @@ def _spread(errors: FloatArray, laplace: bool) -> float:
 
 def _log_likelihood(errors: FloatArray, spread: float, independent: float, laplace: bool) -> float:
     """Return the mean log density of errors times the number of independent ones."""
+    return independent * float(np.mean(_log_density(errors, spread, laplace)))
+
+
+def _log_density(errors: FloatArray, spread: float, laplace: bool) -> FloatArray:
     if laplace:
-        return -independent * float(np.log(2.0 * spread) + np.mean(np.abs(errors)) / spread)
-    return -independent * float(0.5 * np.log(2.0 * np.pi) + np.log(spread) + 0.5 * np.mean(errors**2) / spread**2)
+        return -np.log(2.0 * spread) - np.abs(errors) / spread
+    return -0.5 * np.log(2.0 * np.pi) - np.log(spread) - 0.5 * (errors / spread) ** 2

@@ -13,8 +13,10 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.problem import StaticUse
 from friction_ocp.friction.static import Coulomb, Stribeck, Viscous
 from friction_ocp.recording.static_points import StaticPoints
+from friction_ocp.report.models_section import models_section
 from friction_ocp.statistics.compare import Comparison, compare
 from friction_ocp.statistics.scores import scores_of
+from friction_ocp.statistics_document import comparison_document
 
 TAU_C, VISCOUS = Free(0.07, 0.0, 2.0), Free(2.2e-3, 0.0, 0.03)
 RIGHT = CoulombViscous(TAU_C, VISCOUS)
@@ -50,6 +52,50 @@ def test_special_cases_are_recognised_and_tested(compared: Comparison) -> None:
     assert (refused.added, refused.p_value) == (1, pytest.approx(0.0, abs=1e-10))
     kept = ratios["right", "stribeck"].p_value
     assert kept is None or kept > 1e-3
+
+
+def test_the_lead_is_the_difference_of_held_out_likelihoods(compared: Comparison) -> None:
+    """Sample by sample it sums to the same; no chance puts the smallest model beside the right one."""
+    best = compared.candidates[0].scores.held_out
+    assert best is not None
+    for item in compared.candidates:
+        assert item.scores.held_out is not None
+        assert item.behind is not None
+        assert item.behind.difference == pytest.approx(best - item.scores.held_out, rel=1e-6)
+    assert {item.name for item in compared.candidates if item.behind and item.behind.tied} == {"right", "stribeck"}
+
+
+def with_stribeck(omega_s: Free, train: tuple[int, ...], validation: tuple[int, ...]) -> Comparison:
+    """Compare the right model with one of which it is a special case."""
+    laws = {"general": Stribeck(TAU_C, Free(0.12, 0.0, 2.0), omega_s, VISCOUS), "right": RIGHT}
+    return compare(
+        [replace(with_law(law, *train, validation=validation), title=name) for name, law in laws.items()],
+        execution=HERE,
+    )
+
+
+def test_a_lead_within_its_chance_is_a_tie_and_the_simpler_model_is_preferred() -> None:
+    """A Stribeck speed below all speeds that were driven explains what was held out by a hair better."""
+    found = with_stribeck(Free(0.03, 0.01, 0.05), (1, 2), (3,))
+    first, second = found.candidates
+    assert (first.name, second.name) == ("right", "general")
+    assert first.scores.held_out is not None
+    assert second.scores.held_out is not None
+    assert first.scores.held_out < second.scores.held_out
+    document = comparison_document(found)
+    sentence = models_section(document["compare"], document).sentence
+    assert sentence.startswith("right, general tie by held-out likelihood (a lead of 0.05")
+    assert "and right is preferred as the simplest; so it is by AICc and BIC" in sentence
+
+
+def test_ratios_that_say_little_are_flagged() -> None:
+    """An added parameter at its bound, and a general model whose free run is less likely, both name what to do."""
+    found = with_stribeck(Free(1.0, 0.01, 20.0), (4,), (5,))
+    (ratio,) = found.ratios
+    assert ratio.at_bound == ("motor.friction.omega_s",)
+    worse, stuck = found.warnings
+    assert worse.startswith("general contains right, but its free run is less likely (log-likelihood 4296 to 4301)")
+    assert stuck.startswith("general adds motor.friction.omega_s to right, at its bound")
 
 
 def test_white_errors_are_all_independent(compared: Comparison) -> None:
