@@ -12,7 +12,7 @@ import pytest
 from problem_workshop import Workshop
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.problem_file.check import check
+from friction_ocp.problem_file.check import check, check_before_fit
 from friction_ocp.problem_file.load import load_problem
 
 Content = dict[str, Any]
@@ -463,6 +463,36 @@ def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:
     (workshop.folder / "sweep.h5").write_text("time,current\n0,1\n")
     (message,) = workshop.messages(workshop.problem())
     assert "recordings.train[0]: " in message and "this is not an HDF5 file" in message and "import" in message
+
+
+REQUESTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "effect that does not exist": (
+        put("diagnosis", {"effects": ["stribek"]}),
+        "diagnosis.effects: unknown effect 'stribek'; available: stribeck, ",
+    ),
+    "effect with a slip": (put("diagnosis", {"exclude": ["coging"]}), "did you mean 'cogging'?"),
+    "place without the effect": (
+        put("diagnosis", {"exclude": ["backlash at load"]}),
+        "diagnosis.exclude: backlash makes no sense at 'load' of this drive; an effect that this drive can have",
+    ),
+    "significance": (put("diagnosis", {"significance": 5}), "diagnosis.significance: this is 5; a number between"),
+    "effort": (put("diagnosis", {"effort": "much"}), "diagnosis.effort: this is 'much'; a number above 0"),
+    "negative limit": (put("limits", {"speed": -1}), "limits.speed: this is -1; a positive number in SI units"),
+    "limit in words": (put("limits", {"travel": "2 rad"}), "limits.travel: this is '2 rad'; a positive number in SI"),
+    "infinite limit": (put("limits", {"torque": float("inf")}), "limits.torque: this is inf; a positive number"),
+    "limit that is no number": (put("limits", {"torque": True}), "limits.torque: this is True; a positive number"),
+}
+"""What the file asks of `diagnose` and `design`."""
+
+
+@pytest.mark.parametrize("name", REQUESTS)
+def test_what_would_be_refused_later_is_told_by_the_check(workshop: Workshop, name: str) -> None:
+    """A request that cannot be met is an error before any fit, and no fault for commands that do not ask for it."""
+    spoil, expected = REQUESTS[name]
+    path = workshop.problem(spoil)
+    found = [item for item in check(load_problem(path)) if expected in str(item)]
+    assert [item.severity for item in found] == ["error"]
+    assert expected not in " ".join(map(str, check_before_fit(load_problem(path))))
 
 
 def test_nothing_to_fit_is_an_error_of_the_check(workshop: Workshop) -> None:
