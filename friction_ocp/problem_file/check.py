@@ -18,6 +18,7 @@ from friction_ocp.problem_file.rules import (
     static,
     structure,
     terms,
+    timing,
     values,
 )
 from friction_ocp.problem_file.rules.case import Case, Rule
@@ -28,7 +29,7 @@ MODEL = (*_PARTS, *recordings.NAMES)
 WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 """Rules about what has to be there."""
 _DOUBTS = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-_BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY)
+_BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY, *timing.TIMING)
 
 
 def check(problem: Problem) -> tuple[Finding, ...]:

@@ -465,6 +465,50 @@ def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:
     assert "recordings.train[0]: " in message and "this is not an HDF5 file" in message and "import" in message
 
 
+LATE: dict[str, tuple[Callable[[Content], None], str, str]] = {
+    "output": (
+        put("channels/position/delay", 100.0),
+        "channels.position.delay: delay = 100 s leaves 0 s of 6",
+        "error",
+    ),
+    "input": (put("channels/current/delay", -7.0), "channels.current.delay: delay = -7 s leaves 0 s of 6 s", "error"),
+    "guess": (
+        put("channels/position/delay", {"guess": 20, "min": 0, "max": 90}),
+        "channels.position.delay: delay = 20 s leaves 0 s of 6 s in which both 'position' and 'current' are recorded",
+        "error",
+    ),
+    "motor": (put("drive/motor/dead_time", 50.0), "drive.motor.dead_time: dead_time = 50 s leaves 0 s of 6", "error"),
+    "most of it": (put("channels/position/delay", 5), "delay = 5 s leaves 0.998 s of 6 s", "warning"),
+    "clock": (
+        several(put("channels/position/clock", "logger"), put("clocks", {"logger": {"offset": 1000}})),
+        "clocks.logger.offset: ",
+        "error",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_a_delay_longer_than_the_recordings_is_told(workshop: Workshop, name: str) -> None:
+    """Nothing could be compared: milliseconds taken for seconds, or a wrong sign."""
+    spoil, expected, severity = LATE[name]
+    findings = check(load_problem(workshop.problem(spoil)))
+    assert [item.severity for item in findings if expected in str(item)] == [severity]
+
+
+def test_a_delay_of_a_clock_that_counts_from_elsewhere_is_sound(workshop: Workshop) -> None:
+    """What counts is what is left once delays and clocks are taken back."""
+    other = np.arange(3000) * 0.002 + 1000.0
+
+    def stamp(file: Any) -> None:
+        file["clocks/logger"] = other
+        file["clocks/logger"].attrs["unit"] = "s"
+        file["channels/position"].attrs["clock"] = "/clocks/logger"
+
+    workshop.recording(spoil=stamp)
+    spoil = several(put("channels/position/clock", "logger"), put("clocks", {"logger": {"offset": 1000}}))
+    assert "s of " not in " ".join(workshop.messages(workshop.problem(spoil)))
+
+
 REQUESTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "effect that does not exist": (
         put("diagnosis", {"effects": ["stribek"]}),
