@@ -20,6 +20,7 @@ from friction_ocp.problem_file.rules import (
     terms,
     timing,
     values,
+    work,
 )
 from friction_ocp.problem_file.rules.case import Case, Rule
 
@@ -29,7 +30,7 @@ MODEL = (*_PARTS, *recordings.NAMES)
 WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 """Rules about what has to be there."""
 _DOUBTS = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-_BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY, *timing.TIMING)
+_BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY, *timing.TIMING, *work.WORK)
 
 
 def check(problem: Problem) -> tuple[Finding, ...]:

@@ -580,6 +580,14 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(FRICTION, {**LUGRE, "sigma1": 1, "sigma2": 0.4}),
         "sigma2 = 0.4 is not above sigma1 (tau_s - tau_c)/tau_c = 0.5",
     ),
+    "torque constant that no inertia takes": (
+        put("drive/motor/torque_constant", 800.0),
+        "drive.motor.torque_constant: with torque_constant = 800 N m/A 'current' does 2370 J of work in training, and",
+    ),
+    "torque constant in micro": (
+        put("drive/motor/torque_constant", 5e-7),
+        "and the inertia at its guess gains 0.131 J in the recorded motion; the same within a factor of 100; correct",
+    ),
     "no motor": (
         several(drop("drive/motor"), drop("channels/current")),
         "there is no motor, and no input prescribes the motion of a shaft",
@@ -627,6 +635,18 @@ def test_doubtful_problem_is_a_warning(workshop: Workshop, name: str) -> None:
     load_problem(path)
     messages = [message for message in workshop.messages(path) if expected in message]
     assert len(messages) == 1
+
+
+def test_a_motor_that_coasts_does_no_work_and_is_not_doubted(workshop: Workshop) -> None:
+    """What a shaft loses it had before: only what it gains must have come from the motor."""
+
+    def coast(file: Any) -> None:
+        time = file["time"][:]
+        file["channels/position"][...] = 20.0 * (1.0 - np.exp(-time / 2.0))
+        file["channels/current"][...] = 1e-9 * np.sin(time)
+
+    workshop.recording(spoil=coast)
+    assert "of work" not in " ".join(workshop.messages(workshop.problem()))
 
 
 def test_all_findings_come_at_once(workshop: Workshop) -> None:
