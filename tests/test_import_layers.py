@@ -13,7 +13,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "friction_ocp"
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "whole_file", "kept"),
+    ("errors", "whole_file", "kept", "whereabouts"),
     ("execution", "optional_library"),
     ("quantities", "parameters", "expressions", "dae"),
     ("friction",),
