@@ -36,6 +36,8 @@ def _export(options: argparse.Namespace) -> int:
     exported = export(fitted, options.to, options.out)
     for path in exported.files:
         print(f"Written: {path}")
+    for doubt in exported.doubts:
+        print(f"Doubtful: {doubt}")
     for loss in exported.losses:
         print(f"Not expressed: {loss}")
     if exported.no_price:

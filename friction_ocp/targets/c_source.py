@@ -135,6 +135,7 @@ def _header(fitted: Fitted, tick: bool) -> str:
     lines = [
         f"/* {_plain(problem.title)}",
         "   A drive identified from recordings; SI units. Dry friction is set-valued in every step: it truly sticks.",
+        *(f"   Doubtful: {_plain(doubt)}." for doubt in fitted.doubts),
         f"   States x: {', '.join(states)}",
         f"   Inputs u: {', '.join(inputs) or 'none'}",
         f"   Outputs y: {', '.join(outputs)}",

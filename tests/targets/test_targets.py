@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import csv
+import json
 import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +172,60 @@ def test_an_export_leaves_the_other_files_of_a_result_alone(tmp_path: Path) -> N
     assert (tmp_path / "result.json").read_text(encoding="utf-8") == "{}"
     assert main([*command, str(tmp_path / "table.csv")]) == DONE
     assert main([*command, str(tmp_path / "table.csv")]) == DONE
+
+
+def _result(path: Path, **changes: Any) -> None:
+    """Write the result.json of a fit that gave the guess of an axis as its answer."""
+    found = {"value": 0.002, "verdict": "ok"} | changes.pop("inertia", {})
+    content = {"format": "friction-ocp-result/1", "status": "converged", "parameters": {"motor.inertia": found}}
+    (path.parent / "result.json").write_text(json.dumps(content | changes), encoding="utf-8")
+
+
+GUESSED = "motor.inertia: guesses, no result beside the problem says that they were fitted"
+DOUBTS: dict[str, tuple[dict[str, Any] | None, str]] = {
+    "problem without a result": (None, GUESSED),
+    "changed since the fit": ({"inertia": {"value": 0.003}}, GUESSED),
+    "not converged": (
+        {"status": "not_converged", "message": "Not converged: iteration limit reached. What follows is"},
+        "the fit did not converge (iteration limit reached): its last iterate is not an answer",
+    ),
+    "not told": ({"inertia": {"verdict": "not_identifiable"}}, "motor.inertia: the recordings do not tell them"),
+}
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "fmu", "c", "table"])
+def test_numbers_that_are_no_answer_are_told(
+    name: str, to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the terminal and in the file, where that has room for words; nothing is refused."""
+    stated, expected = DOUBTS[name]
+    path = axis(tmp_path)
+    if stated is not None:
+        _result(path, **copy.deepcopy(stated))
+    out = tmp_path / ("a.c" if to == "c" else f"a.{to}")
+    assert main(["export", str(path), "--to", to, "--out", str(out), "--no-price"]) == DONE
+    assert f"Doubtful: {expected}\n" in capsys.readouterr().out
+    if to == "fmu":
+        text = zipfile.ZipFile(out).read("modelDescription.xml").decode()
+    elif to == "table":
+        assert out.read_text(encoding="utf-8").startswith("shaft,")
+        return
+    else:
+        text = (out.with_suffix(".h") if to == "c" else out).read_text(encoding="utf-8")
+    assert f"Doubtful: {expected}." in text
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "fmu", "c"])
+def test_an_answer_is_not_doubted(to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a fit that converged gave is exported without a word, as are the problems of a diagnosis."""
+    path = axis(tmp_path)
+    _result(path)
+    out = tmp_path / ("a.c" if to == "c" else f"a.{to}")
+    assert main(["export", str(path), "--to", to, "--out", str(out), "--no-price"]) == DONE
+    _result(path, format="friction-ocp-diagnosis/1", parameters={})
+    assert load_fitted(path).doubts == ()
+    assert "Doubtful" not in capsys.readouterr().out
 
 
 def test_the_price_of_what_is_lost_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
