@@ -1,4 +1,4 @@
-"""What is to be doubted of the numbers that are exported: guesses, a fit that did not end, what recordings cannot tell."""
+"""What is to be doubted of numbers that are exported: guesses, a fit that did not end, what recordings do not tell."""
 
 from __future__ import annotations
 

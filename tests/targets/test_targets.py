@@ -289,6 +289,32 @@ def test_the_compensation_is_the_friction_of_all_shafts_at_the_motor(tmp_path: P
         assert compiled.compensate(speed, 1e-9, numbers) == pytest.approx(expected, rel=1e-9)
 
 
+def test_the_compensation_is_told_without_a_price_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Name, arguments, whose friction it cancels, and what of the drive it does not."""
+    ripple = {"cosine": 0.1, "sine": 0.0, "period": 1.0}
+    lugre = {"law": "lugre", "tau_c": 0.03, "tau_s": 0.04, "omega_s": 0.1, "sigma0": 100.0, "load": {"coulomb": 0.02}}
+    rough = {"law": "coulomb", "tau_c": 0.2, "ripple": ripple}
+    path = axis(tmp_path, drive__shafts__0__friction=lugre, drive__shafts__1__friction=rough)
+    assert main(["export", str(path), "--to", "c", "--out", str(tmp_path / "a.c"), "--no-price"]) == DONE
+    printed = capsys.readouterr().out
+    width = f"{compensation_width(load_fitted(path)):.3g}"
+    for expected in (
+        "Compensation: axis_compensate(speed, width, axis_identified) returns the torque, N m, at motor that cancels "
+        "the friction of motor, arm in steady motion",
+        "  speed: wanted, of motor, rad/s",
+        f"  width: rad/s, within which it goes through zero; {width} suits the recordings",
+        "  left out: presliding of motor: its level once it slides is taken at once",
+        "  left out: growth of the friction of motor with the load: it is that without load",
+        "  left out: ripple of the friction of arm: its mean over the angle is taken",
+        "  left out: gravity on arm, which is no friction",
+    ):
+        assert f"{expected}\n" in printed
+    header = (tmp_path / "a.h").read_text(encoding="utf-8")
+    assert "   Left out: gravity on arm, which is no friction.\n" in header
+    assert main(["export", str(path), "--to", "urdf", "--out", str(tmp_path / "a.urdf"), "--no-price"]) == DONE
+    assert "Compensation" not in capsys.readouterr().out
+
+
 def test_compensation_is_predicted_to_shrink_the_tracking_error(tmp_path: Path) -> None:
     """On the servo, which lags behind for other reasons too, the closed loop comes nearer to its reference."""
     (row,) = tracking_gain(load_fitted(servo(tmp_path)))
