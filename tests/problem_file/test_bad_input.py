@@ -61,6 +61,7 @@ RIPPLING = {"cosine": {"guess": 0}, "sine": 0.01, "period": 1}
 LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
 
 FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "no shafts": (put("drive/shafts", []), "drive.shafts: the list has 0 items; at least 1"),
     "unknown key": (
         put(f"{SHAFT}/inerta", 1.0),
         "drive.shafts[0].inerta: unknown key 'inerta'; available: name, inertia, friction, gravity, external_torque, "
@@ -509,12 +510,30 @@ def test_a_delay_of_a_clock_that_counts_from_elsewhere_is_sound(workshop: Worksh
     assert "s of " not in " ".join(workshop.messages(workshop.problem(spoil)))
 
 
+def test_a_motion_of_a_few_samples_is_told_at_its_recording(workshop: Workshop) -> None:
+    """The check says so, not a smoothing in the midst of a fit."""
+
+    def most_are_missing(file: Any) -> None:
+        file["channels/position"][4:] = np.nan
+
+    workshop.recording(spoil=most_are_missing)
+    expected = "recordings.train[0]: {}: no output has more than 4 samples; at least 5; record or import more of it"
+    assert any(
+        expected.format(workshop.folder / "sweep.h5") in message for message in workshop.messages(workshop.problem())
+    )
+
+
 REQUESTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "effect that does not exist": (
         put("diagnosis", {"effects": ["stribek"]}),
         "diagnosis.effects: unknown effect 'stribek'; available: stribeck, ",
     ),
     "effect with a slip": (put("diagnosis", {"exclude": ["coging"]}), "did you mean 'cogging'?"),
+    "effect at a place as design has it": (
+        put("diagnosis", {"effects": ["stribeck@load"]}),
+        "unknown effect 'stribeck@load'; available: ",
+    ),
+    "remedy": (put("diagnosis", {"effects": ["stribeck@load"]}), "; write 'stribeck at load'"),
     "place without the effect": (
         put("diagnosis", {"exclude": ["backlash at load"]}),
         "diagnosis.exclude: backlash makes no sense at 'load' of this drive; an effect that this drive can have",
@@ -588,6 +607,10 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("drive/motor/torque_constant", 5e-7),
         "and the inertia at its guess gains 0.131 J in the recorded motion; the same within a factor of 100; correct",
     ),
+    "output that never moves": (
+        put("channels/position/offset", 0.0),
+        "channels.position: output 'position' never moves: it is 2 rad throughout all training recordings; record",
+    ),
     "no motor": (
         several(drop("drive/motor"), drop("channels/current")),
         "there is no motor, and no input prescribes the motion of a shaft",
@@ -617,6 +640,7 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
 
 DOUBTFUL: dict[str, Callable[[Any], None]] = {
     "no reversal": channel("position", lambda y: 3.0 * np.arange(y.size) * 0.002 + 0.1 * y),
+    "output that never moves": channel("position", lambda y: 0.0 * y + 2.0),
     "gravity over a small angle": channel("position", lambda y: 0.1 * y / np.ptp(y)),
     "noise in another unit": channel("position", lambda y: y + 1e-3 * np.random.default_rng(0).normal(size=y.size)),
     "resolution in another unit": channel("position", lambda y: 1e-3 * np.round(y / 1e-3)),
