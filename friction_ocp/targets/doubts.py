@@ -22,7 +22,7 @@ def doubts_of(names: Sequence[str], values: FloatArray, result: Mapping[str, Any
     """
     if str(result.get("format", "")).startswith("friction-ocp-diagnosis"):
         return ()  # whose problems hold fitted values, that result.json does not repeat
-    fitted = cast(Mapping[str, Mapping[str, Any]], result.get("parameters") or {})
+    fitted = _mapping(result.get("parameters"))
     found: list[str] = []
     if result.get("status") == "not_converged":
         why = str(result.get("message") or "").partition(".")[0].removeprefix("Not converged: ")
@@ -30,14 +30,22 @@ def doubts_of(names: Sequence[str], values: FloatArray, result: Mapping[str, Any
     guesses = [name for name, value in zip(names, values, strict=True) if not _is_fitted(fitted.get(name), value)]
     if guesses:
         found.append(f"{_listed(guesses)}: guesses, no result beside the problem says that they were fitted")
-    blind = [name for name in names if name not in guesses and fitted[name].get("verdict") == "not_identifiable"]
+    blind = [
+        name for name in names if name not in guesses and _mapping(fitted[name]).get("verdict") == "not_identifiable"
+    ]
     if blind:
         found.append(f"{_listed(blind)}: the recordings do not tell them")
     return tuple(found)
 
 
-def _is_fitted(found: Mapping[str, Any] | None, value: float) -> bool:
-    return found is not None and bool(np.isclose(float(found.get("value", np.nan)), value, rtol=_SAME, atol=0.0))
+def _is_fitted(found: Any, value: float) -> bool:
+    stated = _mapping(found).get("value")
+    return isinstance(stated, (int, float)) and bool(np.isclose(float(stated), value, rtol=_SAME, atol=0.0))
+
+
+def _mapping(content: Any) -> Mapping[str, Any]:
+    """Return what a file holds where a mapping is expected, {} where it is none."""
+    return cast(Mapping[str, Any], content) if isinstance(content, dict) else {}
 
 
 def _listed(names: Sequence[str]) -> str:

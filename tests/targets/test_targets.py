@@ -185,6 +185,8 @@ GUESSED = "motor.inertia: guesses, no result beside the problem says that they w
 DOUBTS: dict[str, tuple[dict[str, Any] | None, str]] = {
     "problem without a result": (None, GUESSED),
     "changed since the fit": ({"inertia": {"value": 0.003}}, GUESSED),
+    "no mapping": ({"parameters": [1, 2]}, GUESSED),
+    "no numbers": ({"inertia": {"value": None}}, GUESSED),
     "not converged": (
         {"status": "not_converged", "message": "Not converged: iteration limit reached. What follows is"},
         "the fit did not converge (iteration limit reached): its last iterate is not an answer",
