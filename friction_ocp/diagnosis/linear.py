@@ -225,12 +225,12 @@ def _banded_factors(diagonal: FloatArray, upper: FloatArray) -> FloatArray:
     Directions that nothing holds, but for rounding, are held by as much as it takes.
     """
     count, states = diagonal.shape[:2]
-    band, column = np.zeros((2 * states, count, states)), np.arange(states)
+    band = np.zeros((2 * states, count, states))
     for k in range(states):
         band[: states - k, :, k] = diagonal[:, k:, k].T
         band[states - k : 2 * states - k, :-1, k] = upper[:, k, :].T
     for held in HELD:
-        band[0, :, column] = 1.0 + held
+        band[0] = 1.0 + held
         try:
             return linalg.cholesky_banded(band.reshape(2 * states, -1), lower=True, check_finite=False)
         except np.linalg.LinAlgError:
