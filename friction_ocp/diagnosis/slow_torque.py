@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.rounding import Rounding, rounding_of
 from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, KinematicError, Shaft
 from friction_ocp.effects.effect import (
     Clues,
@@ -26,7 +27,7 @@ from friction_ocp.effects.effect import (
     moving_shafts,
 )
 from friction_ocp.parameters import start_of
-from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+from friction_ocp.simulation.grid import FloatArray
 
 STRETCHES = 24
 """In each recording, a constant in each."""
@@ -64,8 +65,8 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
     """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
     if fitted.footing.segment_s is None:
         return ()
-    stays = _stays(fitted)
-    return tuple(slow_torque_of(fitted, probe, stays) for probe in probes(fitted, clues))
+    rounding = rounding_of(fitted)
+    return tuple(slow_torque_of(fitted, probe, rounding) for probe in probes(fitted, clues))
 
 
 def significant(found: Sequence[SlowTorque], level: float) -> bool:
@@ -108,45 +109,8 @@ def _number(fitted: FittedModel, path: str, stated: object) -> float:
     return fitted.values.get(path, float(guess) if isinstance(guess, (int, float)) else 0.0)
 
 
-def _stays(fitted: FittedModel) -> IntArray:
-    """Return (rows,) the number of the stay, one value of a channel for several samples, to which a row belongs, or -1.
-
-    A counter that shows the same while the drive stands still or turns back errs by the same.
-    """
-    rows = fitted.linear.rows
-    found, count = np.full(rows.residual.size, -1, dtype=np.int64), 0
-    for index, item in enumerate(fitted.linear.recordings):
-        for channel in range(item.seen.shape[1]):
-            own = np.flatnonzero((rows.recording == index) & (rows.channel == channel))
-            own = own[item.seen[rows.node[own], channel]]
-            values = item.item.measured[rows.node[own], channel]
-            number = np.concatenate(([0], np.cumsum(np.diff(values) != 0.0)))[: own.size]
-            long = _is_stay(values)[number]
-            found[own[long]] = count + number[long]
-            count += int(own.size)
-    return found
-
-
-def _is_stay(values: FloatArray) -> BoolArray:
-    """Return (runs of equal values,) which are not just passed through.
-
-    A count that a drive passes at a steady speed errs by as much on the way in as on the way out, which adds up to
-    nothing. Where it turns back, or dwells for longer than at the counts beside, that is not so.
-    """
-    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
-    lengths = np.diff(np.concatenate(([0], edges, [values.size])))
-    if lengths.size < 3:
-        return lengths > 1
-    level = values[np.concatenate(([0], edges))]
-    passed = np.zeros(lengths.size, dtype=bool)
-    passed[1:-1] = (level[1:-1] - level[:-2]) * (level[2:] - level[1:-1]) > 0
-    beside = np.zeros(lengths.size)
-    beside[1:-1] = np.maximum(lengths[:-2], lengths[2:])
-    return (lengths > 1) & ~(passed & (lengths <= 2 * beside))
-
-
-def slow_torque_of(fitted: FittedModel, probe: Probe, stays: IntArray) -> SlowTorque:
-    """Test one place; `stays` (rows,) numbers the samples that share an error of rounding, -1 for those that do not."""
+def slow_torque_of(fitted: FittedModel, probe: Probe, rounding: Rounding) -> SlowTorque:
+    """Test one place; samples share what `rounding` says."""
     built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
     theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0
@@ -162,13 +126,13 @@ def slow_torque_of(fitted: FittedModel, probe: Probe, stays: IntArray) -> SlowTo
         whole[begin : begin + own.shape[0]] = own
         columns.append(whole)
         begin += own.shape[0]
-    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)), stays)
+    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)), rounding)
 
 
-def _tested(place: str, fitted: FittedModel, columns: FloatArray, stays: IntArray) -> SlowTorque:
-    """Test amplitudes against what noise makes of them: white, and for each stay one error of the same size."""
+def _tested(place: str, fitted: FittedModel, columns: FloatArray, rounding: Rounding) -> SlowTorque:
+    """Test amplitudes against what noise makes of them."""
     rows = fitted.linear.rows
-    powers, axes = np.linalg.eigh(columns.T @ columns + _shared(columns, stays))
+    powers, axes = np.linalg.eigh(rounding.covariance(columns))
     told = powers > TOLD * max(float(powers[-1]), 1e-300)
     freedom = int(np.sum(told))
     if freedom == 0:
@@ -176,16 +140,3 @@ def _tested(place: str, fitted: FittedModel, columns: FloatArray, stays: IntArra
     amplitudes = axes[:, told].T @ (columns.T @ rows.residual) / np.sqrt(powers[told])
     ratio = float(np.mean(amplitudes**2))
     return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom)))
-
-
-def _shared(columns: FloatArray, stays: IntArray) -> FloatArray:
-    """Return (columns, columns) what stays add to the covariance that white noise gives the sums over columns.
-
-    Within a stay of n samples, errors that are one error have n times the power along their sum, and none beside it;
-    the latter is left as it is for noise that is not.
-    """
-    inside = np.flatnonzero(stays >= 0)
-    _, number, lengths = np.unique(stays[inside], return_inverse=True, return_counts=True)
-    sums = np.zeros((lengths.size, columns.shape[1]))
-    np.add.at(sums, number, columns[inside])
-    return (sums * ((lengths - 1.0) / np.maximum(lengths, 1))[:, None]).T @ sums

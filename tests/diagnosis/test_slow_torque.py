@@ -11,6 +11,7 @@ from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.rounding import Rounding
 from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, significant, slow_torque_of, slow_torques
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
@@ -45,7 +46,7 @@ def test_coarse_counts_are_no_slow_error(tmp_path: Path) -> None:
     clues = clues_of(fitted)
     assert all(item.p_value > 0.01 for item in slow_torques(fitted, clues))
     probe = next(item for item in probes(fitted, clues) if item.component == "position")
-    white = slow_torque_of(fitted, probe, np.full(fitted.linear.rows.residual.size, -1))
+    white = slow_torque_of(fitted, probe, Rounding(np.full(fitted.linear.rows.residual.size, -1)))
     assert white.p_value < 1e-6, "the stays are what makes the difference"
 
 
