@@ -36,7 +36,7 @@ class Column:
     unit: str = ""
     """"" takes the unit that the file states."""
     scale: str | None = None
-    """What one count is, such as "2*pi/4096 rad", for unit "counts"."""
+    """What one count is, such as "2*pi/4096 rad"; the unit is "counts" then, stated or not."""
     wrap: float | None = None
     """How much a counter loses when it starts over, in the numbers of the column."""
     reset: float | None = None
@@ -177,6 +177,8 @@ class _MapReader:
         for key, example in _POSITIVE.items():
             if numbers.get(key) is not None and not cast(float, numbers[key]) > 0.0:
                 self.report(f"{place}.{key}", f"{key} is {keys[key]!r}", f"a number above 0, such as {example}")
+        if "scale" in texts:
+            texts.setdefault("unit", "counts")
         time = self.time(f"{place}.time", keys["time"]) if "time" in keys else None
         return Column(name, **cast(dict[str, Any], texts | numbers), time=time)
 
@@ -188,7 +190,7 @@ class _MapReader:
         return None
 
     def dimension(self, place: str, column: Column) -> str | None:
-        if not column.unit and column.scale is None:
+        if not column.unit:
             return None
         try:
             return dimension_of(to_si((), column.unit, f"{self.where}: {place}", scale=column.scale)[1])

@@ -55,7 +55,40 @@ def test_inspection_tells_name_unit_rate_and_length(tmp_path: Path, name: str) -
         row = next(row for row in rows if f"  {entry['column']}  " in row).split()
         assert ("deg" in row or "mA" in row) == case.units_in_file
         assert {"400", "100"} & set(row)
-        assert {"200", "50"} & set(row) or name.startswith(("matlab", "json", "npz"))
+        assert {"200", "50"} & set(row)
+
+
+def test_units_and_times_in_the_names_of_columns_are_taken(tmp_path: Path) -> None:
+    """Columns of Parquet that are called `angle [deg]` need no unit in the map, and give rates in the unit of time."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    late = np.where(np.arange(400) % 4 == 0, np.repeat(current(), 4), np.nan)
+    table = pa.table({"time [ms]": 1e3 * fast(), "angle [deg]": angle(), "current (mA)": late})
+    pq.write_table(table, tmp_path / "run.parquet")
+    told = [row.split() for row in inspect_file(tmp_path / "run.parquet").splitlines()]
+    assert told[1][-2:] == ["[ms]'", "(ms)."]
+    assert [row[3:6] for row in told[3:]] == [["ms", "400", "200"], ["deg", "400", "200"], ["mA", "400", "50"]]
+    assert told[5][-2:] == ["300", "empty"]
+    case = ForeignCase(lambda folder: folder / "run.parquet", {"angle": {"column": 1}}, {"column": 0})
+    seen = import_recording(tmp_path / "run.parquet", case.map(tmp_path)).channels["angle"]
+    np.testing.assert_allclose(seen.time, fast(), rtol=ROUNDING)
+    np.testing.assert_allclose(seen.values, np.deg2rad(angle()), rtol=ROUNDING)
+
+
+def test_a_scale_alone_is_that_of_counts(tmp_path: Path) -> None:
+    """A channel that its file calls counts needs no more than the scale."""
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append([Signal(np.arange(400, dtype=np.uint16), fast(), name="encoder", unit="counts")])
+        file.save(tmp_path / "run.mf4")
+    entry = {"column": "encoder", "scale": "2*pi/400 rad"}
+    case = ForeignCase(lambda folder: folder / "run.mf4", {"angle": entry})
+    values = import_recording(tmp_path / "run.mf4", case.map(tmp_path)).channels["angle"].values
+    np.testing.assert_allclose(values, 2.0 * np.pi / 400.0 * np.arange(400), rtol=ROUNDING)
+    without = ForeignCase(case.write, {"angle": {"column": "encoder"}})
+    assert "unit 'counts' has no scale; counts need a stated scale" in refusal(without, tmp_path)
 
 
 def test_dates_count_from_the_first(tmp_path: Path) -> None:
@@ -294,7 +327,7 @@ def test_json_tells_single_values_and_tables_of_number_over_number(tmp_path: Pat
     assert "4 columns, JSON; beside them mass = 0.49" in shown
     rows = {row.split()[1]: row.split() for row in shown.splitlines()[1:] if row[:1].isdigit()}
     assert rows["speed.key"][-2:] == ["1", "2.5"] and rows["speed.value"][-2:] == ["0.53", "1.12"]
-    assert rows["t"][-2:] == ["0", "1"] and rows["mode"][-2:] == ["no", "numbers"]
+    assert rows["t"][-4:] == ["0", "1", "1", "empty"] and rows["mode"][-2:] == ["no", "numbers"]
 
 
 def test_objects_of_numpy_are_not_unpickled(tmp_path: Path) -> None:
