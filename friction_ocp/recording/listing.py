@@ -118,7 +118,8 @@ def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:
     if values is None or not present.any():
         return Listed(signal, rate, seconds, timed_by=timed_by)
     seen = values[present]
-    turn, empty = looks_like_counter(seen), int(np.count_nonzero(~present))
+    counter, empty = looks_like_counter(seen), int(np.count_nonzero(~present))
+    turn = None if counter is None else counter.turn
     return Listed(signal, rate, seconds, float(seen.min()), float(seen.max()), turn, empty, timed_by)
 
 

@@ -17,7 +17,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.checks import check_recording, check_static_points
 from friction_ocp.recording.conditioning import without_low_pass
-from friction_ocp.recording.counters import unroll
+from friction_ocp.recording.counters import looks_like_counter, unroll
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
@@ -211,11 +211,21 @@ def _converted(raw: Values, item: _Wanted, origin: int, path: Path) -> tuple[Flo
     if not is_real(raw):
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' holds no real numbers but {raw.dtype}"))
     counted = _since(raw, origin, _nanoseconds(item)) if origin else np.asarray(raw, dtype=np.float64)
+    if _is_time(item.place) and item.entry.wrap is None and item.entry.reset is None:
+        _refuse_turnover(counted, item, where)
     values = unroll(counted, item.entry.wrap, item.entry.reset, where)
     converted, unit = to_si(values, item.unit, where, scale=item.entry.scale)
     if _is_time(item.place) and unit != "s":
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' is in {item.unit}", "a unit such as s, ms or us"))
     return converted, unit
+
+
+def _refuse_turnover(counted: FloatArray, item: _Wanted, where: str) -> None:
+    counter = looks_like_counter(counted)
+    if counter is not None:
+        at = counter.samples[0]
+        what = f"'{item.signal.name}' starts over at sample {at} ({counted[at]:.10g} after {counted[at - 1]:.10g})"
+        raise FrictionOcpError(Finding(where, what, "times that only grow", f"state `wrap: {counter.turn:.10g}`"))
 
 
 def _channels(

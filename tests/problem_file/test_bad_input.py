@@ -407,6 +407,14 @@ RECORDING_FAULTS: dict[str, tuple[Callable[[Any], None], str]] = {
     "no unit": (channel("position", lambda y: y, unit=""), "channel 'position' has no unit"),
     "time backwards": (channel("time", backwards), "time is not increasing at sample 100 (0.1960 s after 0.1980 s)"),
     "all NaN": (channel("position", lambda y: y * np.nan), "channel 'position' has no value: all 3000 samples are NaN"),
+    "counter that starts over": (
+        channel("position", lambda y: 1e-5 * (np.round(y / 1e-5) % 65536)),
+        "channel 'position' jumps 16 times by 0.65536 rad, 65536 steps of its resolution, within one sample, first at ",
+    ),
+    "angle that starts over": (
+        channel("position", lambda y: np.arctan2(np.sin(9 * y), np.cos(9 * y))),
+        "by one turn, 6.28319 rad, within one sample, first at ",
+    ),
     "clipped output": (
         channel("position", lambda y: np.clip(y, 0.8 * y.min(), 0.8 * y.max())),
         "channel 'position' is clipped: it stays at its extremes of ",
@@ -439,6 +447,13 @@ def test_fault_of_a_recording_is_found(workshop: Workshop, name: str) -> None:
     assert len([message for message in messages if expected in message]) == 1, "\n".join(messages)
     place = "channels.current" if name == "still input" else f"recordings.train[0]: {workshop.folder}/sweep.h5"
     assert f"problem.yaml: {place}: " in messages[0]
+
+
+def test_a_counter_that_starts_over_is_not_told_as_a_wrong_sign(workshop: Workshop) -> None:
+    """What is wrong with a motion of jumps is the jumps, whatever the work seems to be."""
+    workshop.recording(spoil=channel("position", lambda y: (np.round((y + 0.5) * 65536) % 65536) / 65536))
+    messages = workshop.messages(workshop.problem())
+    assert ["it starts over like a counter" in text for text in messages] == [True]
 
 
 def test_a_sign_is_wrong_in_all_recordings_or_not_at_all(workshop: Workshop) -> None:

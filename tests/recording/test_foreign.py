@@ -247,6 +247,23 @@ def test_wraps_are_unrolled(tmp_path: Path, turn: float) -> None:
     assert f"near half of wrap = {0.15 * turn:.6g}; steps of" in refusal(case, tmp_path, wrap=0.15 * turn)
 
 
+def test_a_forgotten_wrap_is_told_with_what_to_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The import of an encoder of 16 bits that starts over says how often, and what the map lacks; with it, nothing."""
+    turns = np.round(2e5 * np.sin(6.0 * fast()) + 1e5).astype(int) % 65536
+    rows = "".join(f"{t:.3f},{n}\n" for t, n in zip(fast(), turns, strict=True))
+    (tmp_path / "run.csv").write_text("t,n\n" + rows)
+    entry = {"column": "n", "unit": "counts", "scale": "2*pi/4096 rad"}
+    time = {"column": "t", "unit": "s"}
+    jumps = np.count_nonzero(np.abs(np.diff(turns)) > 32768)
+    for more, told in (({}, True), ({"wrap": 65536}, False)):
+        case = ForeignCase(lambda folder: folder / "run.csv", {"angle": {**entry, **more}}, time)
+        arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+        assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+        said = capsys.readouterr().err
+        assert (f"map.yaml: channels.angle: channel 'angle' jumps {jumps} times by 100.531 rad" in said) == told
+        assert ("write `wrap: 65536` there" in said) == told
+
+
 def test_a_filter_of_the_logger_is_undone(tmp_path: Path) -> None:
     """A step seen through a first-order filter is a step again, and a time constant of zero is refused."""
     time = 0.01 * np.arange(100)
@@ -272,6 +289,10 @@ def test_clocks_that_start_over_go_on(tmp_path: Path) -> None:
         case = ForeignCase(lambda folder: folder / "run.csv", {"x": {"column": "x", "unit": "A"}}, time)
         found = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["x"].time
         np.testing.assert_allclose(np.diff(found), 0.01, rtol=1e-9)
+    case = ForeignCase(case.write, {"angle": {"column": "x", "unit": "A"}}, {"column": "a", "unit": "us"})
+    assert "'a' starts over at sample 50 (0 after 4294957296); times that only grow; state `wrap: 4294967296`" in (
+        refusal(case, tmp_path)
+    )
 
 
 def test_a_reset_counter_goes_on_at_its_speed(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from friction_ocp.problem_file.rules.power import sign_of_work
 from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
+from friction_ocp.recording.doubts import starts_over, turnover_text
 from friction_ocp.recording.recording import FloatArray
 
 
@@ -118,6 +119,15 @@ def _pooled(case: Case, channel: Channel) -> FloatArray:
     return np.concatenate(values) if values else np.empty(0)
 
 
+def angles_do_not_start_over(case: Case) -> Iterator[Finding]:
+    """No angle loses a full turn of its counter from one sample to the next."""
+    for where, channel, recorded in case.recorded():
+        found = starts_over(recorded) if channel.signal == "theta" else None
+        if found is not None:
+            remedy = "import it again with `wrap` in its map, which --inspect of the log tells, or unroll it"
+            yield Finding(where, turnover_text(recorded, found), "an angle goes on past a full turn", remedy)
+
+
 def current_and_motion_agree(case: Case) -> Iterator[Finding]:
     """The recorded power can be that of a body with friction: it would not be if a sign were wrong."""
     if len(case.drive.motors) != 1:
@@ -152,8 +162,9 @@ def _turned_round(case: Case, channel: Channel, shaft: str, sign: float) -> Iter
         effort = sign * (recorded.values - offset) / gain
         signs[case.at_recording(place, use)] = sign_of_work(motion, recorded.time, effort, heavy)
     fits_elsewhere = 1 in signs.values()
+    jumping = {finding.where for finding in angles_do_not_start_over(case)} if -1 in signs.values() else set[str]()
     for where, found in signs.items():
-        if found < 0:
+        if found < 0 and where not in jumping:
             what = f"channel '{channel.name}' and the motion of shaft '{shaft}' have opposite signs"
             allowed = "a positive torque accelerates in the positive direction"
             remedy = f"set the gain of '{channel.name}' to -1, or correct the sign of the position"
@@ -168,6 +179,7 @@ RECORDINGS: tuple[Rule, ...] = (
     recordings_have_the_channels,
     units_fit_signals,
     channels_are_not_clipped,
+    angles_do_not_start_over,
     motors_are_enabled,
     inputs_move,
     current_and_motion_agree,

@@ -1,0 +1,48 @@
+"""What is doubtful about the samples of a recording, whatever they are of: one rule a function."""
+
+from __future__ import annotations
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.quantities import to_si
+from friction_ocp.recording.counters import Turnover, turnover
+from friction_ocp.recording.header_unit import header_unit
+from friction_ocp.recording.import_map import Column, ImportMap
+from friction_ocp.recording.recording import Channel, Recording
+
+
+def starts_over(channel: Channel) -> Turnover | None:
+    """Return the turn that a channel of an angle or a length loses time and again, if it does."""
+    sound = channel.unit in ("rad", "m") and channel.values.shape == channel.time.shape
+    return turnover(channel.values, channel.unit) if sound else None
+
+
+def turnover_text(channel: Channel, found: Turnover) -> str:
+    """Return what was seen of a counter: how often it jumps, when first, and by how much."""
+    times = "once" if len(found.samples) == 1 else f"{len(found.samples)} times"
+    size = f"{found.turn:.6g} {channel.unit}"
+    turn = f"one turn, {size}," if found.steps is None else f"{size}, {found.steps} steps of its resolution,"
+    first = f"first at {channel.time[found.samples[0]]:.4f} s"
+    return f"channel '{channel.name}' jumps {times} by {turn} within one sample, {first}: it starts over like a counter"
+
+
+def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Finding, ...]:
+    """Return what is doubtful about a recording that a map made, and what to write into the map."""
+    findings: list[Finding] = []
+    for name, entry in import_map.channels.items():
+        channel = recording.channels[name]
+        counter = starts_over(channel)
+        if counter is not None:
+            remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
+            where = f"{import_map.where}: channels.{name}"
+            findings.append(Finding(where, turnover_text(channel, counter), "", remedy, "warning"))
+    return tuple(findings)
+
+
+def _in_column(entry: Column, turn: float) -> str:
+    """Return a turn in the numbers of its column."""
+    unit = entry.unit or (header_unit(entry.column) if isinstance(entry.column, str) else "")
+    try:
+        size = float(to_si(1.0, unit, scale=entry.scale)[0])
+    except FrictionOcpError:
+        return f"<{turn:.10g} in SI, in the numbers of the column>"
+    return f"{abs(turn / size):.10g}"
