@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.counters import Turnover, turnover
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.recording.sampling import gaps
+
+ACROSS_GAPS = "inputs run in a line across it (hold: zero keeps the last value), and nothing is compared there"
+"""What becomes of a gap."""
 
 
 def starts_over(channel: Channel) -> Turnover | None:
@@ -25,6 +33,24 @@ def turnover_text(channel: Channel, found: Turnover) -> str:
     return f"channel '{channel.name}' jumps {times} by {turn} within one sample, {first}: it starts over like a counter"
 
 
+def gap_texts(channels: Iterable[Channel]) -> Iterator[str]:
+    """Yield what is to be said of gaps in the samples of channels; those with the same gaps stand in one sentence."""
+    found: dict[tuple[tuple[float, float], ...], list[Channel]] = {}
+    for channel in channels:
+        if channel.values.shape == channel.time.shape:
+            found.setdefault(gaps(channel.time[np.isfinite(channel.values)]), []).append(channel)
+    for places, having in found.items():
+        if places:
+            longest = max(places, key=lambda gap: gap[1] - gap[0])
+            usual = float(np.median(np.diff(having[0].time[np.isfinite(having[0].values)])))
+            names = ", ".join(f"'{channel.name}'" for channel in having)
+            more = f" (the longest of {len(places)} gaps)" if len(places) > 1 else ""
+            yield (
+                f"no samples of {names} from {longest[0]:.4f} s to {longest[1]:.4f} s, {longest[1] - longest[0]:.3g} s "
+                f"where {usual:.3g} s is usual{more}"
+            )
+
+
 def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Finding, ...]:
     """Return what is doubtful about a recording that a map made, and what to write into the map."""
     findings: list[Finding] = []
@@ -35,6 +61,11 @@ def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Findi
             remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
             where = f"{import_map.where}: channels.{name}"
             findings.append(Finding(where, turnover_text(channel, counter), "", remedy, "warning"))
+    where = str(recording.path or recording.name)
+    for text in gap_texts(recording.channels.values()):
+        findings.append(
+            Finding(where, text, ACROSS_GAPS, "split the log there if the machine moved meanwhile", "warning")
+        )
     return tuple(findings)
 
 

@@ -390,6 +390,18 @@ def speed_in_degrees(file: Any) -> None:
     file["/channels/second"].attrs["unit"] = "rad/s"
 
 
+def interrupted(file: Any) -> None:
+    """Leave the samples from 2.0 s to 2.8 s out of everything."""
+    for name in ("position", "current", "time"):
+        channel(name, lambda y: np.delete(y, slice(1000, 1400)))(file)
+
+
+def with_holes(values: Any) -> Any:
+    """Return values of which two stretches are missing."""
+    values[500:700] = values[2000:2100] = np.nan
+    return values
+
+
 def backwards(time: Any) -> Any:
     return np.where(np.arange(time.size) == 100, time[98], time)
 
@@ -541,6 +553,14 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("channels/current/hold", "zero"),
         "sweep.h5: a sample every 2 s; time in s; correct the time axis if it is in ms",
     ),
+    "interruption": (
+        put("channels/current/noise_std", 1e-3),
+        "no samples of 'current', 'position' from 1.9980 s to 2.8000 s, 0.802 s where 0.002 s is usual; inputs",
+    ),
+    "missing samples": (
+        put("channels/current/hold", "zero"),
+        "no samples of 'position' from 0.9980 s to 1.4000 s, 0.402 s where 0.002 s is usual (the longest of 2 gaps); ",
+    ),
     "validated on the training data": (
         put("recordings/validation", ["sweep.h5"]),
         "this file also stands in recordings.tr",
@@ -555,6 +575,8 @@ DOUBTFUL: dict[str, Callable[[Any], None]] = {
     "resolution in another unit": channel("position", lambda y: 1e-3 * np.round(y / 1e-3)),
     "two sensors of one shaft in different units": speed_in_degrees,
     "time in milliseconds": channel("time", lambda t: 1e3 * t),
+    "interruption": interrupted,
+    "missing samples": channel("position", with_holes),
 }
 """Recordings that go with the doubtful problems."""
 

@@ -264,6 +264,19 @@ def test_a_forgotten_wrap_is_told_with_what_to_write(tmp_path: Path, capsys: pyt
         assert ("write `wrap: 65536` there" in said) == told
 
 
+def test_an_interrupted_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The import of a log that pauses for 0.8 s says where, and what becomes of it."""
+    kept = np.delete(np.arange(400), slice(100, 260))
+    rows = "".join(f"{fast()[k]:.3f},{angle()[k]}\n" for k in kept.tolist())
+    (tmp_path / "run.csv").write_text("t,x\n" + rows)
+    channels = {"angle": {"column": "x", "unit": "deg"}}
+    case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+    arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+    assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+    said = capsys.readouterr().err
+    assert "run.csv: no samples of 'angle' from 0.4950 s to 1.3000 s, 0.805 s where 0.005 s is usual; inputs" in said
+
+
 def test_a_filter_of_the_logger_is_undone(tmp_path: Path) -> None:
     """A step seen through a first-order filter is a step again, and a time constant of zero is refused."""
     time = 0.01 * np.arange(100)
