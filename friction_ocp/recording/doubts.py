@@ -12,10 +12,12 @@ from friction_ocp.recording.counters import Turnover, turnover
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, Recording
-from friction_ocp.recording.sampling import gaps
+from friction_ocp.recording.sampling import gaps, held_for
 
 ACROSS_GAPS = "inputs run in a line across it (hold: zero keeps the last value), and nothing is compared there"
 """What becomes of a gap."""
+AS_NEW = "the repeats count as measured"
+"""What becomes of a repeated value."""
 
 
 def starts_over(channel: Channel) -> Turnover | None:
@@ -51,6 +53,18 @@ def gap_texts(channels: Iterable[Channel]) -> Iterator[str]:
             )
 
 
+def repeats(channel: Channel) -> int | None:
+    """Return how many times a channel repeats every value, if it does."""
+    return held_for(channel.values) if channel.values.shape == channel.time.shape else None
+
+
+def repeats_text(channel: Channel, count: int) -> str:
+    """Return what was seen of a channel whose values are repeated."""
+    usual = float(np.median(np.diff(channel.time)))
+    seldom = f"a new one comes every {count * usual:.3g} s, not every {usual:.3g} s"
+    return f"channel '{channel.name}' repeats every value {count} times: {seldom}"
+
+
 def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Finding, ...]:
     """Return what is doubtful about a recording that a map made, and what to write into the map."""
     findings: list[Finding] = []
@@ -61,6 +75,11 @@ def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Findi
             remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
             where = f"{import_map.where}: channels.{name}"
             findings.append(Finding(where, turnover_text(channel, counter), "", remedy, "warning"))
+        count = repeats(channel)
+        if count is not None:
+            where = f"{import_map.where}: channels.{name}"
+            remedy = f"write `held: {count}` there, which keeps the first of each, unless it is a command that is held"
+            findings.append(Finding(where, repeats_text(channel, count), AS_NEW, remedy, "warning"))
     where = str(recording.path or recording.name)
     for text in gap_texts(recording.channels.values()):
         findings.append(

@@ -13,6 +13,7 @@ from friction_ocp.quantities import dimension_of, to_si
 from friction_ocp.recording.counters import looks_like_counter
 from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, is_real
 from friction_ocp.recording.recording import FloatArray
+from friction_ocp.recording.sampling import held_for
 
 READ_SAMPLES = 20_000_000
 """Samples in a file up to which all values are looked at, not only the times."""
@@ -31,6 +32,8 @@ class Listed:
     high: float | None = None
     turn: float | None = None
     """What it seems to lose each time it starts over."""
+    held: int | None = None
+    """How many times each value is repeated, where that is so."""
     empty: int = 0
     """Samples that are missing."""
     timed_by: str = ""
@@ -120,12 +123,16 @@ def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:
     seen = values[present]
     counter, empty = looks_like_counter(seen), int(np.count_nonzero(~present))
     turn = None if counter is None else counter.turn
-    return Listed(signal, rate, seconds, float(seen.min()), float(seen.max()), turn, empty, timed_by)
+    held = held_for(values)
+    return Listed(signal, rate, seconds, float(seen.min()), float(seen.max()), turn, held, empty, timed_by)
 
 
 def _cells(index: int, item: Listed) -> tuple[str, ...]:
     numbers = (item.rate, item.seconds, item.low, item.high)
     notes = [] if item.turn is None else [f"starts over: wrap: {item.turn:.10g}?"]
+    if item.held is not None:
+        new = "" if item.rate is None else f", {item.rate / item.held:.6g} new ones per s"
+        notes.append(f"repeats every value: held: {item.held}?{new}")
     if item.empty:
         notes.append(f"{item.empty} empty")
     if not item.signal.numeric:

@@ -561,6 +561,14 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("channels/current/hold", "zero"),
         "no samples of 'position' from 0.9980 s to 1.4000 s, 0.402 s where 0.002 s is usual (the longest of 2 gaps); ",
     ),
+    "repeated measurement": (
+        put("channels/current/hold", "zero"),
+        "'position' repeats every value 5 times: a new one comes every 0.01 s, not every 0.002 s; the repeats count as",
+    ),
+    "repeated command": (
+        put("channels/current/noise_std", 1e-3),
+        "state `hold: zero` if it is a command that the drive holds, else import it again with `held: 10` in its map",
+    ),
     "validated on the training data": (
         put("recordings/validation", ["sweep.h5"]),
         "this file also stands in recordings.tr",
@@ -577,6 +585,8 @@ DOUBTFUL: dict[str, Callable[[Any], None]] = {
     "time in milliseconds": channel("time", lambda t: 1e3 * t),
     "interruption": interrupted,
     "missing samples": channel("position", with_holes),
+    "repeated measurement": channel("position", lambda y: np.repeat(y[::5], 5)),
+    "repeated command": channel("current", lambda y: np.repeat(y[::10], 10)),
 }
 """Recordings that go with the doubtful problems."""
 

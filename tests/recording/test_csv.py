@@ -225,6 +225,7 @@ def map_of(**changes: str) -> str:
             "channels.x: unknown key 'gain'; available: column, unit, scale",
         ),
         ({"channels": "{x: {column: x, unit: A, wrap: 0}}"}, "channels.x.wrap: wrap is 0; a number above 0"),
+        ({"channels": "{x: {column: x, unit: A, held: 2.5}}"}, "channels.x.held: held is 2.5; a whole number of"),
         ({"channels": "{x: {column: x, unit: A, wrap: .nan}}"}, "channels.x.wrap: this is nan; a number"),
         ({"channels": "{x: {column: x, unit: A, time: {column: t, unit: A}}}"}, "channels.x.time: unit 'A' does not"),
         ({"channels": "{a/b: {column: x, unit: A}}"}, "channels.a/b: the name has a slash"),

@@ -277,6 +277,47 @@ def test_an_interrupted_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "run.csv: no samples of 'angle' from 0.4950 s to 1.3000 s, 0.805 s where 0.005 s is usual; inputs" in said
 
 
+def test_values_of_a_slower_logger_are_told_and_thinned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A current of 50 Hz in rows of 200 Hz is told by --inspect and by the import; `held` keeps each value once."""
+    rows = zip(fast().tolist(), angle().tolist(), np.repeat(current(), 4).tolist(), strict=True)
+    (tmp_path / "run.csv").write_text("t,x,i\n" + "".join(f"{t:.3f},{x},{i}\n" for t, x, i in rows))
+    listed = inspect_file(tmp_path / "run.csv").splitlines()
+    assert [" held: " in row for row in listed[3:]] == [False, False, True]
+    assert listed[5].endswith("repeats every value: held: 4?, 50 new ones per s")
+    for more, told in (({}, True), ({"held": 4}, False)):
+        channels = {"angle": {"column": "x", "unit": "deg"}, "current": {"column": "i", "unit": "mA", **more}}
+        case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+        arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+        assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+        said = capsys.readouterr().err
+        assert (
+            "channel 'current' repeats every value 4 times: a new one comes every 0.02 s, not every" in said
+        ) == told
+        assert ("write `held: 4` there" in said) == told
+    values = read_recording(tmp_path / "out.h5").channels["current"].values
+    np.testing.assert_allclose(values[::4], 1e-3 * current(), rtol=ROUNDING)
+    assert np.count_nonzero(np.isfinite(values)) == 100
+
+
+def test_empty_cells_beside_a_time_of_its_own_are_no_samples(tmp_path: Path) -> None:
+    """Of two loggers in one table the slower one fills few rows: it gets a clock with those alone."""
+    cells = [f"{t:.3f},{i}" for t, i in zip(slow().tolist(), current().tolist(), strict=True)]
+    for layout in ("spread", "first"):
+        beside = {4 * k if layout == "spread" else k: text for k, text in enumerate(cells)}
+        rows = (f"{t:.3f},{x},{beside.get(k, ',')}\n" for k, (t, x) in enumerate(zip(fast(), angle(), strict=True)))
+        (tmp_path / "run.csv").write_text("t,x,t2,i\n" + "".join(rows))
+        own = {"column": "t2", "unit": "s"}
+        channels = {"angle": {"column": "x", "unit": "deg"}, "current": {"column": "i", "unit": "mA", "time": own}}
+        case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+        seen = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels
+        np.testing.assert_allclose(seen["current"].time, slow(), atol=ROUNDING)
+        np.testing.assert_allclose(seen["current"].values, 1e-3 * current(), rtol=ROUNDING)
+        assert (seen["angle"].time.size, seen["current"].clock) == (400, "t2")
+    (tmp_path / "run.csv").write_text("t,x,t2,i\n0,1,0,1\n1,2,,2\n2,3,2,3\n")
+    with pytest.raises(FrictionOcpError, match=r"clock 't2' is not finite at sample 1 \(1 of 3 samples\)"):
+        import_recording(tmp_path / "run.csv", tmp_path / "map.yaml")
+
+
 def test_a_filter_of_the_logger_is_undone(tmp_path: Path) -> None:
     """A step seen through a first-order filter is a step again, and a time constant of zero is refused."""
     time = 0.01 * np.arange(100)
