@@ -10,6 +10,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.conditioning import detect_resolution
 from friction_ocp.recording.recording import FloatArray
+from friction_ocp.recording.sampling import interrupted
 
 AMBIGUOUS = 0.4
 """Share of a turn above which a step may be one in the other direction that was sampled too slowly."""
@@ -70,26 +71,29 @@ class Turnover:
     """How many steps of its resolution a turn has; None where it is one of 360 deg."""
 
 
-def looks_like_counter(values: FloatArray) -> Turnover | None:
-    """Return where raw values seem to start over, after a power of two, 360 or 2 pi; else None."""
+def looks_like_counter(values: FloatArray, time: FloatArray | None = None) -> Turnover | None:
+    """Return where raw values seem to start over, after a power of two, 360 or 2 pi; else None.
+
+    With `time`, (n,) s, what passes in a gap is left aside.
+    """
     seen = values[np.isfinite(values)]
     whole = bool(np.all(seen == np.round(seen)))
     turns = (turn for turn in _KNOWN_TURNS if not (whole and turn == 2.0 * np.pi))
-    return _first_turnover(values, {turn: None for turn in turns})
+    return _first_turnover(values, time, {turn: None for turn in turns})
 
 
-def turnover(values: FloatArray, unit: str) -> Turnover | None:
-    """Return where values in SI seem to start over: after one turn, or after a power of two of their resolution."""
+def turnover(values: FloatArray, unit: str, time: FloatArray | None = None) -> Turnover | None:
+    """Return the same of values in SI, that may start over after one turn or a power of two of their resolution."""
     seen = values[np.isfinite(values)]
     turns: dict[float, int | None] = {2.0 * np.pi: None} if unit == "rad" else {}
     resolution = detect_resolution(seen)
     if resolution is not None:
         bits = max(int(np.ceil(np.log2(np.round(np.ptp(seen) / resolution) + 1.0))), _FEWEST_BITS)
         turns[resolution * 2.0**bits] = 2**bits
-    return _first_turnover(values, turns)
+    return _first_turnover(values, time, turns)
 
 
-def _first_turnover(values: FloatArray, turns: Mapping[float, int | None]) -> Turnover | None:
+def _first_turnover(values: FloatArray, time: FloatArray | None, turns: Mapping[float, int | None]) -> Turnover | None:
     """Return the first turn that values lose and win: they stay within it, and without the jumps nothing is left.
 
     A jump is a step of more than three quarters of a turn, among others of less than a quarter of it. What is left of
@@ -100,7 +104,9 @@ def _first_turnover(values: FloatArray, turns: Mapping[float, int | None]) -> Tu
     present = np.flatnonzero(np.isfinite(values))
     if present.size < 4:
         return None
-    steps, span = np.abs(np.diff(values[present])), float(np.ptp(values[present]))
+    joined = np.ones(present.size - 1, dtype=bool) if time is None else ~interrupted(time[present])
+    after, steps = present[1:][joined], np.abs(np.diff(values[present]))[joined]
+    span = float(np.ptp(values[present]))
     for turn, resolved in turns.items():
         far = steps > 0.75 * turn
         jumps, others = steps[far], steps[~far]
@@ -108,5 +114,5 @@ def _first_turnover(values: FloatArray, turns: Mapping[float, int | None]) -> Tu
         if span > (1.0 + 1e-9) * turn or not few or np.any(others > 0.25 * turn) or not np.any(others):
             continue
         if np.median(np.abs(jumps - turn)) <= np.max(others) + 1e-9 * turn:
-            return Turnover(turn, tuple((present[1:][far]).tolist()), resolved)
+            return Turnover(turn, tuple(after[far].tolist()), resolved)
     return None

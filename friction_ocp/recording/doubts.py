@@ -23,7 +23,7 @@ AS_NEW = "the repeats count as measured"
 def starts_over(channel: Channel) -> Turnover | None:
     """Return the turn that a channel of an angle or a length loses time and again, if it does."""
     sound = channel.unit in ("rad", "m") and channel.values.shape == channel.time.shape
-    return turnover(channel.values, channel.unit) if sound else None
+    return turnover(channel.values, channel.unit, channel.time) if sound else None
 
 
 def turnover_text(channel: Channel, found: Turnover) -> str:
@@ -69,23 +69,23 @@ def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Findi
     """Return what is doubtful about a recording that a map made, and what to write into the map."""
     findings: list[Finding] = []
     for name, entry in import_map.channels.items():
-        channel = recording.channels[name]
-        counter = starts_over(channel)
-        if counter is not None:
-            remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
-            where = f"{import_map.where}: channels.{name}"
-            findings.append(Finding(where, turnover_text(channel, counter), "", remedy, "warning"))
-        count = repeats(channel)
-        if count is not None:
-            where = f"{import_map.where}: channels.{name}"
-            remedy = f"write `held: {count}` there, which keeps the first of each, unless it is a command that is held"
-            findings.append(Finding(where, repeats_text(channel, count), AS_NEW, remedy, "warning"))
+        findings += _doubts_of_channel(recording.channels[name], entry, f"{import_map.where}: channels.{name}")
+    remedy = "split the log there if the machine moved meanwhile"
+    if any(entry.wrap is not None for entry in import_map.channels.values()):
+        remedy += ": of a counter, whole turns are lost in it"
     where = str(recording.path or recording.name)
-    for text in gap_texts(recording.channels.values()):
-        findings.append(
-            Finding(where, text, ACROSS_GAPS, "split the log there if the machine moved meanwhile", "warning")
-        )
-    return tuple(findings)
+    found = gap_texts(recording.channels.values())
+    return (*findings, *(Finding(where, text, ACROSS_GAPS, remedy, "warning") for text in found))
+
+
+def _doubts_of_channel(channel: Channel, entry: Column, where: str) -> Iterator[Finding]:
+    counter, count = starts_over(channel), repeats(channel)
+    if counter is not None:
+        remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
+        yield Finding(where, turnover_text(channel, counter), "", remedy, "warning")
+    if count is not None:
+        remedy = f"write `held: {count}` there, which keeps the first of each, unless it is a command that is held"
+        yield Finding(where, repeats_text(channel, count), AS_NEW, remedy, "warning")
 
 
 def _in_column(entry: Column, turn: float) -> str:

@@ -114,6 +114,10 @@ def _guessed_axis(k: int, signal: Signal, signals: Sequence[Signal], times: dict
 def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:
     present = np.ones(signal.samples, dtype=bool) if values is None else np.isfinite(values)
     time = axis.time[present] if len(axis.time) == present.size else np.empty(0)
+    counter = None
+    if values is not None:
+        timed = len(time) == np.count_nonzero(present) and bool(np.all(np.isfinite(time)))
+        counter = looks_like_counter(values[present], time if timed else None)
     time = time[np.isfinite(time)]
     step = float(np.quantile(np.diff(time), 0.5, method="lower")) if len(time) > 1 else 0.0
     rate, seconds = (1.0 / step, float(time[-1] - time[0])) if step > 0.0 else (None, None)
@@ -121,7 +125,7 @@ def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:
     if values is None or not present.any():
         return Listed(signal, rate, seconds, timed_by=timed_by)
     seen = values[present]
-    counter, empty = looks_like_counter(seen), int(np.count_nonzero(~present))
+    empty = int(np.count_nonzero(~present))
     turn = None if counter is None else counter.turn
     held = held_for(values)
     return Listed(signal, rate, seconds, float(seen.min()), float(seen.max()), turn, held, empty, timed_by)

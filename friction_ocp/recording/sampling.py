@@ -13,22 +13,27 @@ CHANCE = 0.01
 
 
 def gaps(time: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Return where samples are missing, first and last instant, s, of every gap between samples at `time`.
+    """Return where samples are missing, first and last instant, s, of every gap between samples at `time`."""
+    at = np.flatnonzero(interrupted(time))
+    return tuple(zip(time[at].tolist(), time[at + 1].tolist(), strict=True))
+
+
+def interrupted(time: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return (n - 1,) which intervals between samples at `time`, (n,) s, are gaps.
 
     A gap is an interval that is too long for chance even if samples came at random instants (Poisson), the most
     irregular way to log steadily: then the longest of `n` intervals of mean `m` is above m log(n / CHANCE) with the
     probability CHANCE. Gaps are left out of the mean, one after the other.
     """
     intervals = np.diff(time)
-    usual = np.ones(intervals.size, dtype=bool)
+    usual = np.isfinite(intervals)
     while usual.any():
         bound = float(np.mean(intervals[usual])) * np.log(intervals.size / CHANCE)
         shorter = intervals <= bound
         if np.array_equal(shorter, usual):
             break
         usual = shorter
-    at = np.flatnonzero(~usual)
-    return tuple(zip(time[at].tolist(), time[at + 1].tolist(), strict=True))
+    return ~usual
 
 
 def held_for(values: FloatArray) -> int | None:

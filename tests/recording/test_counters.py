@@ -24,6 +24,17 @@ def test_a_forgotten_wrap_is_found(bits: int, signed: bool) -> None:
         assert si.turn == pytest.approx(1e-4 * turn)
 
 
+def test_what_passes_in_a_gap_is_left_aside() -> None:
+    """A counter that goes on by a third of a turn while nothing is logged is found between the gaps."""
+    time = np.append(np.arange(1000), 1800.0 + np.arange(1000)) * 1e-3
+    turn = 65536.0
+    shown = np.round(turn * 3.29 * time) % turn
+    assert turn / 4.0 < abs(shown[1000] - shown[999]) < 3.0 * turn / 4.0
+    found = looks_like_counter(shown, time)
+    assert found is not None and (found.turn, len(found.samples)) == (turn, 7)
+    assert turnover(1e-4 * shown, "rad", time) is not None
+
+
 def test_commands_that_step_are_no_counters() -> None:
     """Steps to and fro between two levels, with ramps or noise, are none, whatever their size."""
     rng = np.random.default_rng(3)
