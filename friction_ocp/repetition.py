@@ -26,6 +26,7 @@ from friction_ocp.statistics.compare import compare
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.multistart import multistart
 from friction_ocp.statistics.profile import profile
+from friction_ocp.whereabouts import problem_place, recording_places
 from friction_ocp.whole_file import write_text
 
 FORMAT = "friction-ocp-rerun/1"
@@ -104,7 +105,8 @@ def rerun(
     made = _provenance(before, path)
     if (folder / "result.json").exists() and (folder / "result.json").samefile(path):
         raise FrictionOcpError(Finding(str(folder), "this is where the result lies", remedy="give another --out"))
-    places = [_place(item, path, problem) for item in made["problems"]]
+    places = [problem or _place(item, path) for item in made["problems"]]
+    made = _located(made, path, places[0])
     problems = [load_problem(place, item["text"]) for place, item in zip(places, made["problems"], strict=True)]
     _begin(folder, hashlib.sha256(path.read_bytes()).hexdigest())
     _COMMANDS[made["command"]["name"]](problems, made, folder, execution)
@@ -161,13 +163,24 @@ def _provenance(result: Json, path: Path) -> Json:
     return made
 
 
-def _place(item: Json, result: Path, stated: Path | None) -> Path:
-    """Return where the problem file lies, or lay: as stated, as it was named, or beside a folder above the result."""
-    if stated is not None:
-        return stated
-    named = Path(item["path"])
-    above = [folder / named for folder in result.resolve().parents]
-    return next((path for path in (named, *above) if path.exists()), named)
+def _place(item: Json, result: Path) -> Path:
+    return problem_place(Path(item["path"]), item.get("sha256", ""), result)
+
+
+def _located(made: Json, result: Path, problem: Path) -> Json:
+    """Return the provenance with the recordings of a batch, named by their paths, named by where they lie now.
+
+    Raises FrictionOcpError where one is gone.
+    """
+    if made["command"]["name"] != "batch":
+        return made
+    before: Mapping[str, str] = made["recordings"]
+    places = recording_places(before, result, Path(made["problems"][0]["path"]), problem)
+    remedy = "put it there, or run the command in the folder from which the result was made"
+    lost = [Finding(name, "this recording is gone", remedy=remedy) for name, at in places.items() if not at.is_file()]
+    if lost:
+        raise FrictionOcpError(lost)
+    return {**made, "recordings": {places[name].as_posix(): digest for name, digest in before.items()}}
 
 
 def _begin(folder: Path, result: str) -> None:

@@ -13,7 +13,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "friction_ocp"
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "whole_file", "kept"),
+    ("errors", "whole_file", "kept", "whereabouts"),
     ("execution", "optional_library"),
     ("quantities", "parameters", "expressions", "dae"),
     ("friction",),
@@ -21,8 +21,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("simulation", "recording"),
     ("estimation", "effects"),
     ("statistics",),
-    ("diagnosis", "problem_file", "plots", "result_document", "progress_bar"),
+    ("diagnosis", "plots", "result_document", "progress_bar"),
     ("excitation",),
+    ("problem_file",),
     ("report", "statistics_document", "diagnosis_document", "design_document", "fleet", "targets", "drafts"),
     ("result_folder", "fleet_document"),
     ("diagnosis_folder", "design_folder", "fleet_folder"),

@@ -122,6 +122,53 @@ def test_a_batch_is_made_again(made: Path, tmp_path: Path) -> None:
     assert (status, found["differences"], found["changed"]) == (DONE, [], [])
 
 
+@pytest.fixture(scope="module")
+def fleet(made: Path) -> Path:
+    """Return a folder in which a batch was run with paths relative to it."""
+    folder = made / "fleet"
+    shutil.copytree(made / "nights", folder / "nights")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        write_axis(Path("axis.yaml"), Path("nights") / "telescope-01" / "night-01.h5")
+        assert main(["batch", "axis.yaml", "nights", "--out", "results/batch", "--workers", "1"]) == DONE
+    return folder
+
+
+@pytest.mark.parametrize("where", ["elsewhere", "moved", "decoy"])
+def test_a_batch_is_made_again_from_another_folder(
+    where: str, fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Recordings are found as the problem file is; one of the same name that is another file is not taken for it."""
+    source = fleet
+    if where == "moved":
+        source = tmp_path / "new home"
+        shutil.copytree(fleet, source)
+        shutil.move(source / "results" / "batch", tmp_path / "batch")
+        result, more = tmp_path / "batch", ["--problem", str(source / "axis.yaml")]
+    else:
+        result, more = source / "results" / "batch", []
+    if where == "decoy":
+        shutil.copytree(fleet / "nights", tmp_path / "nights")
+        write_axis(tmp_path / "axis.yaml", Path("nights") / "telescope-01" / "night-02.h5")
+        with h5py.File(tmp_path / "nights" / "telescope-01" / "night-02.h5", "r+") as file:
+            file["channels/position"][...] *= 1.1
+    monkeypatch.chdir(tmp_path)
+    assert main(["rerun", str(result), "--out", "again", "--workers", "1", *more]) == DONE
+    found = json.loads((tmp_path / "again" / "rerun.json").read_text(encoding="utf-8"))
+    assert (found["differences"], found["changed"]) == ([], [])
+
+
+def test_a_recording_of_a_batch_that_is_gone_is_named(
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before any work, with what to do."""
+    shutil.copytree(fleet / "results" / "batch", tmp_path / "batch")
+    monkeypatch.chdir(tmp_path)
+    assert main(["rerun", "batch", "--out", "again"]) == WRONG_INPUT
+    assert "nights/telescope-01/night-01.h5: this recording is gone; " in capsys.readouterr().err
+    assert not (tmp_path / "again").exists()
+
+
 def test_a_changed_problem_file_is_named_and_not_used(copied: Path) -> None:
     """The result holds the problem that made it."""
     path = copied / "axis.yaml"

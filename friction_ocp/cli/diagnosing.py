@@ -30,7 +30,7 @@ def _diagnose(options: argparse.Namespace) -> int:
     from friction_ocp.report.diagnosis_words import diagnosis_summary
     from friction_ocp.statistics.execution import Execution
 
-    folder, problem = output_folder(options), checked(options)
+    folder, problem = output_folder(options), checked(options, search=True)
     try:
         diagnosis = diagnose(problem, _Lines(), Execution(executor(options), folder))
     except KeyboardInterrupt:
@@ -47,7 +47,7 @@ def _design(options: argparse.Namespace) -> int:
     from friction_ocp.report.design_words import design_summary
 
     folder, between = output_folder(options), [_pair(text) for text in options.between]
-    save_design(design(checked(options), options.criterion, between, _Lines()), folder)
+    save_design(design(checked(options, search=True), options.criterion, between, _Lines()), folder)
     show(options, folder, design_summary)
     return DONE
 

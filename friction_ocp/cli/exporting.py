@@ -25,6 +25,8 @@ def add_commands(commands: Any) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
+    from friction_ocp.targets.c_source import compensation_width
+    from friction_ocp.targets.compensation_words import compensation_text
     from friction_ocp.targets.export import export
     from friction_ocp.targets.fitted import files_of, load_fitted
     from friction_ocp.targets.price import judged_by, price_text
@@ -36,8 +38,12 @@ def _export(options: argparse.Namespace) -> int:
     exported = export(fitted, options.to, options.out)
     for path in exported.files:
         print(f"Written: {path}")
+    for doubt in exported.doubts:
+        print(f"Doubtful: {doubt}")
     for loss in exported.losses:
         print(f"Not expressed: {loss}")
+    if options.to == "c":
+        print(compensation_text(fitted, compensation_width(fitted)))
     if exported.no_price:
         print(f"What it costs is not measured: {exported.no_price}.")
     if options.no_price or exported.price is None or not fitted.model.problem.recordings:

@@ -76,13 +76,13 @@ def refuse_overwriting(out: Path, sources: Iterable[Path]) -> None:
         raise FrictionOcpError(Finding(str(out), what, remedy="give another --out"))
 
 
-def checked(options: argparse.Namespace) -> Problem:
-    """Load a problem; refuse errors, show warnings."""
-    from friction_ocp.problem_file.check import check_before_fit
+def checked(options: argparse.Namespace, search: bool = False) -> Problem:
+    """Load a problem; refuse errors, show warnings; `search` where more than a fit is asked for."""
+    from friction_ocp.problem_file.check import check_before_fit, check_before_search
     from friction_ocp.problem_file.load import load_problem
 
     problem = load_problem(options.problem)
-    findings = check_before_fit(problem)
+    findings = (check_before_search if search else check_before_fit)(problem)
     errors = [finding for finding in findings if finding.severity == "error"]
     if errors:
         raise FrictionOcpError(errors)

@@ -27,7 +27,7 @@ FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
 SHORTEST, LONGEST = 2, 50
 """Samples in a segment."""
-MOST_SEGMENTS, MOST_CUTS = 1000, 200
+MOST_SEGMENTS, MOST_CUTS = 3000, 200
 """In one recording, and intervals of doubtful torque that are cut out; more would cost time and tell no more."""
 QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
 """Shares of a segment at which what gathers within it is looked at."""
@@ -132,7 +132,8 @@ def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> 
     if is_held(model.problem.drive) and not any(density.values()):
         return Footing(density, numbers, None, model.noise, train, model.drive.input_names, loss)
     bare = Footing(density, numbers, None, model.noise, train, model.drive.input_names)
-    seconds = _segment_length(model, bare, first)
+    longest = max(float(item.grid.time[-1] - item.grid.time[0]) for item in train)
+    seconds = max(_segment_length(model, bare, first), longest / MOST_SEGMENTS)
     inflated = np.sqrt(model.noise**2 + _within(model, bare, first, seconds))
     return Footing(density, numbers, seconds, inflated, train, model.drive.input_names)
 

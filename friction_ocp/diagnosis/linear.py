@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+
+linalg: Any = _linalg  # its own types are incomplete
+
+HELD = (0.0, 1e-12, 1e-9, 1e-6, 1.0)
+"""Added in turn to a unit diagonal that rounding has left without factors; with the last one there are some."""
 
 
 @dataclass(frozen=True)
@@ -183,28 +190,17 @@ class LinearRecording:
         diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
         self.scale = 1.0 / np.sqrt(diagonal[:, index, index])
         diagonal = diagonal * self.scale[:, :, None] * self.scale[:, None, :]
-        self.upper = upper * self.scale[:-1, :, None] * self.scale[1:, None, :]
-        self.inverse = np.empty_like(diagonal)
+        upper = upper * self.scale[:-1, :, None] * self.scale[1:, None, :]
         diagonal[: cut.measured] = np.eye(states)
-        self.upper[: cut.measured] = 0.0
-        for j in range(count):
-            block = diagonal[j]
-            if j:
-                lower = self.upper[j - 1].T
-                block = block - lower @ self.inverse[j - 1] @ self.upper[j - 1]
-            self.inverse[j] = np.linalg.inv(block)
+        upper[: cut.measured] = 0.0
+        self.factors = _banded_factors(diagonal, upper)
 
     def _solve(self, right: FloatArray) -> FloatArray:
         """Return (segments, s, k) node changes for a right-hand side; measured nodes do not move."""
         right = right * self.scale[:, :, None]
         right[: self.cut.measured] = 0.0
-        count = right.shape[0]
-        for j in range(1, count):
-            right[j] -= self.upper[j - 1].T @ (self.inverse[j - 1] @ right[j - 1])
-        right[-1] = self.inverse[-1] @ right[-1]
-        for j in range(count - 2, -1, -1):
-            right[j] = self.inverse[j] @ (right[j] - self.upper[j] @ right[j + 1])
-        return right * self.scale[:, :, None]
+        moved = linalg.cho_solve_banded((self.factors, True), right.reshape(-1, right.shape[2]), check_finite=False)
+        return moved.reshape(right.shape) * self.scale[:, :, None]
 
     def labels(self) -> tuple[FloatArray, IntArray, IntArray]:
         """Return time, channel and grid node of every row."""
@@ -221,6 +217,25 @@ class LinearRecording:
             np.concatenate([channel, kinds]).astype(np.int64),
             np.concatenate([node, later]).astype(np.int64),
         )
+
+
+def _banded_factors(diagonal: FloatArray, upper: FloatArray) -> FloatArray:
+    """Return the Cholesky factors of a block-tridiagonal matrix of unit diagonal, its lower bands as LAPACK has them.
+
+    Directions that nothing holds, but for rounding, are held by as much as it takes.
+    """
+    count, states = diagonal.shape[:2]
+    band = np.zeros((2 * states, count, states))
+    for k in range(states):
+        band[: states - k, :, k] = diagonal[:, k:, k].T
+        band[states - k : 2 * states - k, :-1, k] = upper[:, k, :].T
+    for held in HELD:
+        band[0] = 1.0 + held
+        try:
+            return linalg.cholesky_banded(band.reshape(2 * states, -1), lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            continue
+    raise AssertionError("a matrix that dominates its diagonal has factors")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.expressions import closest
 
 SIGNIFICANCE = 0.01
 EFFORT = 1.0
@@ -139,7 +140,9 @@ def _entries(problem: Problem, key: str, stated: object, findings: list[Finding]
         effect, at, component = entry.partition(AT)
         if effect not in catalogue:
             available = f"available: {', '.join(catalogue)}"
-            findings.append(Finding(where, f"unknown effect {effect!r}", available))
+            name, _, place = effect.partition("@")
+            remedy = f"write '{name}{AT}{place}'" if name in catalogue else closest(effect, list(catalogue))
+            findings.append(Finding(where, f"unknown effect {effect!r}", available, remedy))
             continue
         known = {place: None for drive in drives for place in catalogue[effect].places(drive)}
         if at and component not in known:

@@ -55,7 +55,8 @@ def coherence(time: FloatArray, measured: FloatArray, simulated: FloatArray) -> 
     grid, first, second = _even(time, measured, simulated)
     length = max(8, 2 * grid.size // (SEGMENTS + 1))
     rate = (grid.size - 1) / (grid[-1] - grid[0])
-    frequency, share = signal.coherence(first, second, rate, nperseg=length)
+    with np.errstate(all="ignore"):  # a signal without power depends on nothing
+        frequency, share = signal.coherence(first, second, rate, nperseg=length)
     _, power = signal.welch(first, rate, nperseg=length)
     total = max(float(np.sum(power)), np.finfo(np.float64).tiny)
     return Coherence(np.asarray(frequency), np.nan_to_num(np.asarray(share)), np.asarray(power) / total)

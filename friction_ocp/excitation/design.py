@@ -19,7 +19,7 @@ from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare_fit
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.excitation.limits import Limits, limits_of
+from friction_ocp.excitation.limits import Limits, limits_of, stated_limits
 from friction_ocp.excitation.motions import MOTIONS
 from friction_ocp.excitation.trial_run import TrialRun, refuse_what_is_not_driven, trial_run
 from friction_ocp.excitation.worth import Evidence, evidence, information, known_information
@@ -71,24 +71,29 @@ def design(
     one is named that there is not, or only one.
     """
     refuse_what_is_not_driven(problem.drive)
+    stated_limits(problem)
+    entries = {(effect.name, place): effect for effect, place in candidates(problem.drive, list(effects()))}
+    _refuse_unknown(between, list(entries))
     tell("base model", 0.0)
     base = fit_base(prepare_fit(problem))
     if not between:
         return sharpening(base, criterion, tell)
-    entries = {(effect.name, place): effect for effect, place in candidates(problem.drive, list(effects()))}
-    wrong = [
-        Finding(f"--between {name}@{place}", "there is no such candidate", f"{_nearest(name, list(entries))}")
-        for name, place in between
-        if (name, place) not in entries
-    ]
-    if not wrong and len(set(between)) < 2:
-        wrong = [Finding("--between", "one candidate has nothing to be told from", "two or more EFFECT@PLACE")]
-    if wrong:
-        raise FrictionOcpError(wrong)
     clues, blocks = clues_of(base), blocks_of(base.linear.rows)
     seen = {key: screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)}
     rivals = [completed(quick_refit(base, item)) for item in _begun(seen)]
     return replace(separating(base, rivals, tell), between=tuple(between))
+
+
+def _refuse_unknown(between: Sequence[Key], known: Sequence[Key]) -> None:
+    wrong = [
+        Finding(f"--between {name}@{place}", "there is no such candidate", f"{_nearest(name, known)}")
+        for name, place in between
+        if (name, place) not in known
+    ]
+    if between and not wrong and len(set(between)) < 2:
+        wrong = [Finding("--between", "one candidate has nothing to be told from", "two or more EFFECT@PLACE")]
+    if wrong:
+        raise FrictionOcpError(wrong)
 
 
 def _begun(seen: Mapping[Key, Screened | None]) -> list[Screened]:

@@ -28,7 +28,7 @@ class Limits:
 
 def limits_of(problem: Problem, clues: Clues) -> Limits:
     """Return the limits of a problem; raises FrictionOcpError where a stated one is no positive number."""
-    stated = _stated(problem)
+    stated = stated_limits(problem)
     first = problem.drive.shafts[0].name
     reached = {
         "speed": max(float(np.max(np.abs(track.omega[first]))) for track in clues.tracks),
@@ -38,14 +38,19 @@ def limits_of(problem: Problem, clues: Clues) -> Limits:
     return Limits(**{**reached, **stated}, stated=tuple(stated))
 
 
-def _stated(problem: Problem) -> dict[str, float]:
+def stated_limits(problem: Problem) -> dict[str, float]:
+    """Return the limits that the problem file states; raises FrictionOcpError where one is no positive number."""
     section: Mapping[str, Any] = problem.limits
     where = f"{problem.path or problem.title}: limits"
     wrong = [
         Finding(f"{where}.{key}", f"this is {value!r}", "a positive number in SI units, of the first shaft")
         for key, value in section.items()
-        if value is not None and not (isinstance(value, (int, float)) and value > 0)
+        if value is not None and not _is_positive(value)
     ]
     if wrong:
         raise FrictionOcpError(wrong)
     return {key: float(value) for key, value in section.items() if value is not None}
+
+
+def _is_positive(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 < value < np.inf

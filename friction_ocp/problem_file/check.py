@@ -13,11 +13,14 @@ from friction_ocp.problem_file.rules import (
     foresight,
     plausibility,
     recordings,
+    requests,
     signals,
     static,
     structure,
     terms,
+    timing,
     values,
+    work,
 )
 from friction_ocp.problem_file.rules.case import Case, Rule
 
@@ -26,6 +29,8 @@ MODEL = (*_PARTS, *recordings.NAMES)
 """Rules about what stands in the file, whatever else is missing there."""
 WHOLE = (*structure.WHOLE, *signals.WHOLE, *values.WHOLE, *terms.WHOLE)
 """Rules about what has to be there."""
+_DOUBTS = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
+_BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY, *timing.TIMING, *work.WORK)
 
 
 def check(problem: Problem) -> tuple[Finding, ...]:
@@ -33,15 +38,18 @@ def check(problem: Problem) -> tuple[Finding, ...]:
 
     What the recordings cannot tell comes last, and only where nothing is wrong.
     """
-    found = check_before_fit(problem)
+    found = check_before_search(problem)
     return found if _errors(found) else (*found, *foresight.recordings_tell_the_parameters(Case(problem)))
 
 
 def check_before_fit(problem: Problem) -> tuple[Finding, ...]:
-    """Return the same without what a fit finds out itself: what the recordings cannot tell."""
-    doubts = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
-    named = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY)
-    return _run(Case(problem), (*MODEL, *doubts), named)
+    """Return the same without what a fit does not ask for, or finds out itself: what the recordings cannot tell."""
+    return _run(Case(problem), (*MODEL, *_DOUBTS), _BEFORE_FIT)
+
+
+def check_before_search(problem: Problem) -> tuple[Finding, ...]:
+    """Return the same with what `diagnose` and `design` refuse: what is wrong with `diagnosis` and `limits`."""
+    return _run(Case(problem), (*MODEL, *_DOUBTS), (*_BEFORE_FIT, *requests.REQUESTS))
 
 
 def check_file(problem: Problem) -> tuple[Finding, ...]:

@@ -94,6 +94,9 @@ def _refused_value(details: ErrorDetails) -> tuple[str, str]:
     value, context = details["input"], details.get("ctx", {})
     if details["type"] == "literal_error":
         return f"unknown value {value!r}", f"available: {str(context['expected']).replace(' or ', ', ')}"
+    if details["type"] in ("too_short", "too_long"):
+        length, limit = context["actual_length"], context.get("min_length", context.get("max_length"))
+        return f"the list has {length} items", f"at {'least' if 'min_length' in context else 'most'} {limit}"
     allowed = _TYPES.get(details["type"], details["msg"].replace("Input should be ", "").replace("Value error, ", ""))
     return f"this is {shown(value)}", allowed
 

@@ -19,6 +19,8 @@ optimize: Any = _optimize
 
 _MAD_TO_STD = 1.4826
 _MIN_LEVELS = 5
+FEWEST_SAMPLES = 5
+"""Samples from which the motion between them can be told."""
 
 
 def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
@@ -127,8 +129,9 @@ def smooth_motion(
     """
     t = np.asarray(time, dtype=np.float64)
     t_present, y = _present(time, values)
-    if len(t_present) < 5:
-        raise FrictionOcpError(Finding("smooth motion", f"there are {len(t_present)} samples", "at least 5 are needed"))
+    if len(t_present) < FEWEST_SAMPLES:
+        allowed = f"at least {FEWEST_SAMPLES} are needed"
+        raise FrictionOcpError(Finding("smooth motion", f"there are {len(t_present)} samples", allowed))
     step = float(np.mean(np.diff(t_present)))
     if cutoff_hz is None:
         penalty = _penalty_for_noise(t_present / step, y, high_frequency_noise(t_present, y))

@@ -21,6 +21,7 @@ from friction_ocp.friction.static import NoFriction
 from friction_ocp.quantities import si_unit
 from friction_ocp.simulation.compiled import compiler, load_library
 from friction_ocp.simulation.grid import APPLY, COMPUTE, FloatArray
+from friction_ocp.targets.compensation_words import left_out
 from friction_ocp.targets.fitted import Fitted, Run
 
 FLAGS = ("-std=c99", "-Wall", "-Werror", "-pedantic", "-Wno-unused", "-O2", "-fPIC", "-shared")
@@ -135,6 +136,7 @@ def _header(fitted: Fitted, tick: bool) -> str:
     lines = [
         f"/* {_plain(problem.title)}",
         "   A drive identified from recordings; SI units. Dry friction is set-valued in every step: it truly sticks.",
+        *(f"   Doubtful: {_plain(doubt)}." for doubt in fitted.doubts),
         f"   States x: {', '.join(states)}",
         f"   Inputs u: {', '.join(inputs) or 'none'}",
         f"   Outputs y: {', '.join(outputs)}",
@@ -159,7 +161,9 @@ def _header(fitted: Fitted, tick: bool) -> str:
         *(["/* The sampled controller computes (kind 1) or applies (kind 2) a command. */", _prototype(name, "tick")]),
         f"/* What the motors have to deliver at {_plain(shaft)}, {si_unit('torque', motion)}, to cancel the friction",
         f"   of all shafts at its wanted speed, {si_unit('speed', motion)}; it goes through zero within +-width,",
-        f"   {compensation_width(fitted):.3g} suits the recordings. */",
+        f"   {compensation_width(fitted):.3g} suits the recordings.",
+        *(f"   Left out: {_plain(text)}." for text in left_out(fitted)),
+        "   */",
         _prototype(name, "compensate"),
         "#endif",
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -31,6 +31,8 @@ class Exported:
     price: Callable[[], tuple[PriceRow, ...]] | None = None
     """Measures what the export costs; None for a target that simulates nothing."""
     simulator: str = ""
+    doubts: tuple[str, ...] = ()
+    """Why the numbers may be no answer."""
     no_price: str = ""
     """Why it is not measured, where recordings could be run."""
 
@@ -45,12 +47,13 @@ def export(result: Fitted | str | Path, to: str, path: str | Path) -> Exported:
         raise FrictionOcpError(Finding("export", f"unknown target '{to}'", f"available: {', '.join(TARGETS)}"))
     if Path(path).is_dir():
         raise FrictionOcpError(Finding(str(path), "this is a folder", "a file to write"))
-    return target(result if isinstance(result, Fitted) else load_fitted(result), Path(path))
+    fitted = result if isinstance(result, Fitted) else load_fitted(result)
+    return replace(target(fitted, Path(path)), doubts=fitted.doubts)
 
 
 def _mjcf(fitted: Fitted, path: Path) -> Exported:
     drive = joint_drive(fitted)
-    text = mjcf_text(drive, fitted.name)
+    text = mjcf_text(drive, fitted.name, doubts=fitted.doubts)
     _write(path, text)
     return Exported(
         (path,), drive.losses, lambda: price_table(fitted, MuJoCoRun(fitted, drive, text, False).simulate), "MuJoCo"
@@ -59,7 +62,7 @@ def _mjcf(fitted: Fitted, path: Path) -> Exported:
 
 def _urdf(fitted: Fitted, path: Path) -> Exported:
     drive = joint_drive(fitted, elastic=False)
-    text = urdf_text(drive, fitted.name)
+    text = urdf_text(drive, fitted.name, fitted.doubts)
     _write(path, text)
 
     def price() -> tuple[PriceRow, ...]:

@@ -25,6 +25,7 @@ from friction_ocp.estimation.stages import windows
 from friction_ocp.parameters import Directional, Free, Tie
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.targets.doubts import doubts_of
 
 PROBLEMS = ("fitted.yaml", "augmented.yaml", "base.yaml")
 """Files of a result folder that hold a drive, the best first."""
@@ -56,6 +57,8 @@ class Fitted:
     name: str
     """An identifier in any language."""
     source: Path
+    doubts: tuple[str, ...] = ()
+    """Why its numbers may be no answer."""
 
     @cached_property
     def simulation(self) -> Simulation:
@@ -78,7 +81,9 @@ def load_fitted(result: str | Path) -> Fitted:
     """Read a result folder, its result.json, or a problem file that holds its answer."""
     path = _problem_of(Path(result))
     model = prepare(load_problem(path))
-    return _fitted(model, model.space.guess, path.parent.name if path.name in PROBLEMS else path.stem, path)
+    theta = model.space.guess
+    fitted = _fitted(model, theta, path.parent.name if path.name in PROBLEMS else path.stem, path)
+    return replace(fitted, doubts=doubts_of(model.space.names, theta, result_document(fitted)))
 
 
 def fitted_of(estimate: Estimate) -> Fitted:

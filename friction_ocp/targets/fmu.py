@@ -104,7 +104,8 @@ def _description(fitted: Fitted, name: str, guid: str) -> str:
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="2.0" modelName={title} guid="{guid}"',
-        '    generationTool="friction_ocp" variableNamingConvention="flat">',
+        '    generationTool="friction_ocp" variableNamingConvention="flat"',
+        f"    description={quoteattr(_told(fitted))}>",
         f'  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true"',
         '      canInterpolateInputs="true" canGetAndSetFMUstate="true" maxOutputDerivativeOrder="0">',
         f'    <SourceFiles><File name="{name}.c"/></SourceFiles>',
@@ -121,6 +122,11 @@ def _description(fitted: Fitted, name: str, guid: str) -> str:
         "</fmiModelDescription>",
     ]
     return "\n".join(line for line in lines if line) + "\n"
+
+
+def _told(fitted: Fitted) -> str:
+    doubts = "".join(f" Doubtful: {doubt}." for doubt in fitted.doubts)
+    return f"A drive identified from recordings.{doubts}"
 
 
 def _scalar(name: str, reference: int, causality: str, variability: str, unit: str, start: float | None) -> str:

@@ -17,12 +17,13 @@ APART = 1.0
 """Distance between bodies, m, for the eye alone."""
 
 
-def mjcf_text(drive: JointDrive, name: str, step: float = STEP) -> str:
-    """Return a model that runs as it is; what it cannot express stands in its comment."""
+def mjcf_text(drive: JointDrive, name: str, step: float = STEP, doubts: Sequence[str] = ()) -> str:
+    """Return a model that runs as it is; what it cannot express, and `doubts`, stand in its comment."""
     lines = [
         f"<!-- {name}: joint dynamics identified from recordings.",
         "     The command of an actuator is the torque, current or voltage of its motor, in SI units.",
-        *(f"     Left out: {_comment(str(loss))}." for loss in drive.losses),
+        *(f"     Doubtful: {xml_comment(doubt)}." for doubt in doubts),
+        *(f"     Left out: {xml_comment(str(loss))}." for loss in drive.losses),
         "-->",
         f"<mujoco model={quoteattr(name)}>",
         '  <compiler angle="radian" autolimits="true"/>',
@@ -37,7 +38,8 @@ def mjcf_text(drive: JointDrive, name: str, step: float = STEP) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _comment(text: str) -> str:
+def xml_comment(text: str) -> str:
+    """Return text that a comment may hold."""
     return text.replace("--", "- -")
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 from friction_ocp.targets.joints import Joint, JointDrive, Loss
-from friction_ocp.targets.mjcf import GRAVITY
+from friction_ocp.targets.mjcf import GRAVITY, xml_comment
 
 
 def urdf_losses(drive: JointDrive) -> tuple[Loss, ...]:
@@ -24,12 +25,13 @@ def urdf_losses(drive: JointDrive) -> tuple[Loss, ...]:
     return tuple(losses)
 
 
-def urdf_text(drive: JointDrive, name: str) -> str:
-    """Return a robot of one link a coordinate; what it cannot express stands in its comment."""
+def urdf_text(drive: JointDrive, name: str, doubts: Sequence[str] = ()) -> str:
+    """Return a robot of one link a coordinate; what it cannot express, and `doubts`, stand in its comment."""
     lines = [
         '<?xml version="1.0"?>',
         f"<!-- {name}: joint dynamics identified from recordings.",
-        *(f"     Left out: {str(loss).replace('--', '- -')}." for loss in urdf_losses(drive)),
+        *(f"     Doubtful: {xml_comment(doubt)}." for doubt in doubts),
+        *(f"     Left out: {xml_comment(str(loss))}." for loss in urdf_losses(drive)),
         "-->",
         f"<robot name={quoteattr(name)}>",
         '  <link name="base"/>',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,11 @@ import pytest
 import yaml
 from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.footing import torque_noise
 from friction_ocp.diagnosis.gathered_noise import unit_covariances
+from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.problem_file.load import load_problem
 
@@ -58,3 +62,13 @@ def test_noise_of_a_channel_with_a_gain_is_that_of_the_motor_over_it(bristled: M
     plain, shown = (torque_noise(bristled, known | gain)["motor"] for gain in ({}, {"current.gain": 0.5}))
     assert shown == pytest.approx(2.0 * plain)
     assert shown == pytest.approx(torque_noise(bristled, {"motor.torque_constant": 0.6})["motor"])
+
+
+def test_noise_of_a_current_within_long_segments_is_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a recording has fewer segments than its noisy current asks for, what gathers in each is counted."""
+    monkeypatch.setattr("friction_ocp.diagnosis.footing.MOST_SEGMENTS", 40)
+    fitted = fit_base(prepare(load_problem(write_case(tmp_path, axis()))))
+    found = innovations(fitted)
+    assert fitted.linear.program.segments[0].count <= 45
+    assert 0.1 < found.ratio < DOUBTED
+    assert not found.significant(0.01)

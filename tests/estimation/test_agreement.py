@@ -31,6 +31,12 @@ def test_the_explained_power_is_that_of_the_copy_and_survives_thinning() -> None
     assert thin.explained == pytest.approx(found.explained, rel=1e-9)
 
 
+def test_a_signal_that_stands_still_is_explained_by_none() -> None:
+    """Without power there is nothing to share, and nothing to be warned of."""
+    time = np.linspace(0.0, 1.0, 200)
+    assert coherence(time, np.zeros(200), np.zeros(200)).explained == 0.0
+
+
 def test_missing_samples_are_bridged() -> None:
     """Gaps do not spread."""
     wave = np.sin(2 * np.pi * 3.0 * TIME) * np.exp(-0.2 * TIME)

@@ -13,7 +13,7 @@ from diagnosis_cases import axis, write_case
 from plant import Trajectory
 from servo_problem import REPOSITORY
 
-from friction_ocp.cli import main
+from friction_ocp.cli import WRONG_INPUT, main
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.drive.values import bind_drive
@@ -30,6 +30,8 @@ from friction_ocp.recording.recording import Channel, Recording
 
 SPEED = 30.0
 """Limit that the problem states, rad/s: below what the recordings reach."""
+
+LIMIT = "a positive number in SI units, of the first shaft"
 
 
 def silent(what: str, share: float) -> None:
@@ -110,6 +112,39 @@ def test_candidates_that_there_are_not_are_named(path: Path) -> None:
     """A wrong candidate is refused with those that there are."""
     with pytest.raises(FrictionOcpError, match="stribeck@motor"):
         design(load_problem(path), "D", [("stribeck", "load"), ("asymmetry", "motor")], silent)
+
+
+@pytest.mark.parametrize(
+    ("between", "limits", "where"),
+    [
+        ([("stribek", "motor"), ("asymmetry", "motor")], {}, "--between stribek@motor: there is no such candidate"),
+        ([("stribeck", "motor")], {}, "--between: one candidate has nothing to be told from"),
+        ([], {"speed": -1}, "limits.speed: this is -1"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_before_the_fit(
+    path: Path, between: list[tuple[str, str]], limits: dict[str, float], where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody waits for a fit to be told of a slip."""
+
+    def fitted(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("friction_ocp.excitation.design.fit_base", fitted)
+    with pytest.raises(FrictionOcpError, match=where):
+        design(replace(load_problem(path), limits=limits), "D", between, silent)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "design"])
+def test_limits_are_read_before_any_work(
+    command: str, path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A diagnosis is not lost to the limits of the experiment that would follow it."""
+    copy = path.with_name(f"{command}.yaml")
+    copy.write_text(path.read_text(encoding="utf-8").replace("speed: 30.0", "speed: -30.0"), encoding="utf-8")
+    assert main([command, str(copy), "--out", str(tmp_path / "out")]) == WRONG_INPUT
+    assert capsys.readouterr().err == f"{copy}: limits.speed: this is -30.0; {LIMIT}\n"
+    assert not (tmp_path / "out").exists()
 
 
 def test_candidates_that_the_recordings_hardly_show_are_named(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import pytest
 from problem_workshop import Workshop
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.problem_file.check import check
+from friction_ocp.problem_file.check import check, check_before_fit
 from friction_ocp.problem_file.load import load_problem
 
 Content = dict[str, Any]
@@ -61,6 +61,7 @@ RIPPLING = {"cosine": {"guess": 0}, "sine": 0.01, "period": 1}
 LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
 
 FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "no shafts": (put("drive/shafts", []), "drive.shafts: the list has 0 items; at least 1"),
     "unknown key": (
         put(f"{SHAFT}/inerta", 1.0),
         "drive.shafts[0].inerta: unknown key 'inerta'; available: name, inertia, friction, gravity, external_torque, "
@@ -492,6 +493,98 @@ def test_file_that_is_not_hdf5_is_refused(workshop: Workshop) -> None:
     assert "recordings.train[0]: " in message and "this is not an HDF5 file" in message and "import" in message
 
 
+LATE: dict[str, tuple[Callable[[Content], None], str, str]] = {
+    "output": (
+        put("channels/position/delay", 100.0),
+        "channels.position.delay: delay = 100 s leaves 0 s of 6",
+        "error",
+    ),
+    "input": (put("channels/current/delay", -7.0), "channels.current.delay: delay = -7 s leaves 0 s of 6 s", "error"),
+    "guess": (
+        put("channels/position/delay", {"guess": 20, "min": 0, "max": 90}),
+        "channels.position.delay: delay = 20 s leaves 0 s of 6 s in which both 'position' and 'current' are recorded",
+        "error",
+    ),
+    "motor": (put("drive/motor/dead_time", 50.0), "drive.motor.dead_time: dead_time = 50 s leaves 0 s of 6", "error"),
+    "most of it": (put("channels/position/delay", 5), "delay = 5 s leaves 0.998 s of 6 s", "warning"),
+    "clock": (
+        several(put("channels/position/clock", "logger"), put("clocks", {"logger": {"offset": 1000}})),
+        "clocks.logger.offset: ",
+        "error",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_a_delay_longer_than_the_recordings_is_told(workshop: Workshop, name: str) -> None:
+    """Nothing could be compared: milliseconds taken for seconds, or a wrong sign."""
+    spoil, expected, severity = LATE[name]
+    findings = check(load_problem(workshop.problem(spoil)))
+    assert [item.severity for item in findings if expected in str(item)] == [severity]
+
+
+def test_a_delay_of_a_clock_that_counts_from_elsewhere_is_sound(workshop: Workshop) -> None:
+    """What counts is what is left once delays and clocks are taken back."""
+    other = np.arange(3000) * 0.002 + 1000.0
+
+    def stamp(file: Any) -> None:
+        file["clocks/logger"] = other
+        file["clocks/logger"].attrs["unit"] = "s"
+        file["channels/position"].attrs["clock"] = "/clocks/logger"
+
+    workshop.recording(spoil=stamp)
+    spoil = several(put("channels/position/clock", "logger"), put("clocks", {"logger": {"offset": 1000}}))
+    assert "s of " not in " ".join(workshop.messages(workshop.problem(spoil)))
+
+
+def test_a_motion_of_a_few_samples_is_told_at_its_recording(workshop: Workshop) -> None:
+    """The check says so, not a smoothing in the midst of a fit."""
+
+    def most_are_missing(file: Any) -> None:
+        file["channels/position"][4:] = np.nan
+
+    workshop.recording(spoil=most_are_missing)
+    expected = "recordings.train[0]: {}: no output has more than 4 samples; at least 5; record or import more of it"
+    assert any(
+        expected.format(workshop.folder / "sweep.h5") in message for message in workshop.messages(workshop.problem())
+    )
+
+
+REQUESTS: dict[str, tuple[Callable[[Content], None], str]] = {
+    "effect that does not exist": (
+        put("diagnosis", {"effects": ["stribek"]}),
+        "diagnosis.effects: unknown effect 'stribek'; available: stribeck, ",
+    ),
+    "effect with a slip": (put("diagnosis", {"exclude": ["coging"]}), "did you mean 'cogging'?"),
+    "effect at a place as design has it": (
+        put("diagnosis", {"effects": ["stribeck@load"]}),
+        "unknown effect 'stribeck@load'; available: ",
+    ),
+    "remedy": (put("diagnosis", {"effects": ["stribeck@load"]}), "; write 'stribeck at load'"),
+    "place without the effect": (
+        put("diagnosis", {"exclude": ["backlash at load"]}),
+        "diagnosis.exclude: backlash makes no sense at 'load' of this drive; an effect that this drive can have",
+    ),
+    "significance": (put("diagnosis", {"significance": 5}), "diagnosis.significance: this is 5; a number between"),
+    "effort": (put("diagnosis", {"effort": "much"}), "diagnosis.effort: this is 'much'; a number above 0"),
+    "negative limit": (put("limits", {"speed": -1}), "limits.speed: this is -1; a positive number in SI units"),
+    "limit in words": (put("limits", {"travel": "2 rad"}), "limits.travel: this is '2 rad'; a positive number in SI"),
+    "infinite limit": (put("limits", {"torque": float("inf")}), "limits.torque: this is inf; a positive number"),
+    "limit that is no number": (put("limits", {"torque": True}), "limits.torque: this is True; a positive number"),
+}
+"""What the file asks of `diagnose` and `design`."""
+
+
+@pytest.mark.parametrize("name", REQUESTS)
+def test_what_would_be_refused_later_is_told_by_the_check(workshop: Workshop, name: str) -> None:
+    """A request that cannot be met is an error before any fit, and no fault for commands that do not ask for it."""
+    spoil, expected = REQUESTS[name]
+    path = workshop.problem(spoil)
+    found = [item for item in check(load_problem(path)) if expected in str(item)]
+    assert [item.severity for item in found] == ["error"]
+    assert expected not in " ".join(map(str, check_before_fit(load_problem(path))))
+
+
 def test_nothing_to_fit_is_an_error_of_the_check(workshop: Workshop) -> None:
     """A problem of known numbers can be loaded and simulated, but the check says that there is nothing to fit."""
     path = workshop.problem(several(put(f"{SHAFT}/inertia", 1), put(FRICTION, {"law": "coulomb", "tau_c": 1})))
@@ -532,6 +625,18 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
     "LuGre that gives energy back": (
         put(FRICTION, {**LUGRE, "sigma1": 1, "sigma2": 0.4}),
         "sigma2 = 0.4 is not above sigma1 (tau_s - tau_c)/tau_c = 0.5",
+    ),
+    "torque constant that no inertia takes": (
+        put("drive/motor/torque_constant", 800.0),
+        "drive.motor.torque_constant: with torque_constant = 800 N m/A 'current' does 2370 J of work in training, and",
+    ),
+    "torque constant in micro": (
+        put("drive/motor/torque_constant", 5e-7),
+        "and the inertia at its guess gains 0.131 J in the recorded motion; the same within a factor of 100; correct",
+    ),
+    "output that never moves": (
+        put("channels/position/offset", 0.0),
+        "channels.position: output 'position' never moves: it is 2 rad throughout all training recordings; record",
     ),
     "no motor": (
         several(drop("drive/motor"), drop("channels/current")),
@@ -578,6 +683,7 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
 
 DOUBTFUL: dict[str, Callable[[Any], None]] = {
     "no reversal": channel("position", lambda y: 3.0 * np.arange(y.size) * 0.002 + 0.1 * y),
+    "output that never moves": channel("position", lambda y: 0.0 * y + 2.0),
     "gravity over a small angle": channel("position", lambda y: 0.1 * y / np.ptp(y)),
     "noise in another unit": channel("position", lambda y: y + 1e-3 * np.random.default_rng(0).normal(size=y.size)),
     "resolution in another unit": channel("position", lambda y: 1e-3 * np.round(y / 1e-3)),
@@ -600,6 +706,18 @@ def test_doubtful_problem_is_a_warning(workshop: Workshop, name: str) -> None:
     load_problem(path)
     messages = [message for message in workshop.messages(path) if expected in message]
     assert len(messages) == 1
+
+
+def test_a_motor_that_coasts_does_no_work_and_is_not_doubted(workshop: Workshop) -> None:
+    """What a shaft loses it had before: only what it gains must have come from the motor."""
+
+    def coast(file: Any) -> None:
+        time = file["time"][:]
+        file["channels/position"][...] = 20.0 * (1.0 - np.exp(-time / 2.0))
+        file["channels/current"][...] = 1e-9 * np.sin(time)
+
+    workshop.recording(spoil=coast)
+    assert "of work" not in " ".join(workshop.messages(workshop.problem()))
 
 
 def test_all_findings_come_at_once(workshop: Workshop) -> None:

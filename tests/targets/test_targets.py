@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import csv
+import json
 import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +174,62 @@ def test_an_export_leaves_the_other_files_of_a_result_alone(tmp_path: Path) -> N
     assert main([*command, str(tmp_path / "table.csv")]) == DONE
 
 
+def _result(path: Path, **changes: Any) -> None:
+    """Write the result.json of a fit that gave the guess of an axis as its answer."""
+    found = {"value": 0.002, "verdict": "ok"} | changes.pop("inertia", {})
+    content = {"format": "friction-ocp-result/1", "status": "converged", "parameters": {"motor.inertia": found}}
+    (path.parent / "result.json").write_text(json.dumps(content | changes), encoding="utf-8")
+
+
+GUESSED = "motor.inertia: guesses, no result beside the problem says that they were fitted"
+DOUBTS: dict[str, tuple[dict[str, Any] | None, str]] = {
+    "problem without a result": (None, GUESSED),
+    "changed since the fit": ({"inertia": {"value": 0.003}}, GUESSED),
+    "no mapping": ({"parameters": [1, 2]}, GUESSED),
+    "no numbers": ({"inertia": {"value": None}}, GUESSED),
+    "not converged": (
+        {"status": "not_converged", "message": "Not converged: iteration limit reached. What follows is"},
+        "the fit did not converge (iteration limit reached): its last iterate is not an answer",
+    ),
+    "not told": ({"inertia": {"verdict": "not_identifiable"}}, "motor.inertia: the recordings do not tell them"),
+}
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "fmu", "c", "table"])
+def test_numbers_that_are_no_answer_are_told(
+    name: str, to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the terminal and in the file, where that has room for words; nothing is refused."""
+    stated, expected = DOUBTS[name]
+    path = axis(tmp_path)
+    if stated is not None:
+        _result(path, **copy.deepcopy(stated))
+    out = tmp_path / ("a.c" if to == "c" else f"a.{to}")
+    assert main(["export", str(path), "--to", to, "--out", str(out), "--no-price"]) == DONE
+    assert f"Doubtful: {expected}\n" in capsys.readouterr().out
+    if to == "fmu":
+        text = zipfile.ZipFile(out).read("modelDescription.xml").decode()
+    elif to == "table":
+        assert out.read_text(encoding="utf-8").startswith("shaft,")
+        return
+    else:
+        text = (out.with_suffix(".h") if to == "c" else out).read_text(encoding="utf-8")
+    assert f"Doubtful: {expected}." in text
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "fmu", "c"])
+def test_an_answer_is_not_doubted(to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a fit that converged gave is exported without a word, as are the problems of a diagnosis."""
+    path = axis(tmp_path)
+    _result(path)
+    out = tmp_path / ("a.c" if to == "c" else f"a.{to}")
+    assert main(["export", str(path), "--to", to, "--out", str(out), "--no-price"]) == DONE
+    _result(path, format="friction-ocp-diagnosis/1", parameters={})
+    assert load_fitted(path).doubts == ()
+    assert "Doubtful" not in capsys.readouterr().out
+
+
 def test_the_price_of_what_is_lost_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A servo whose friction grows with its load is told to be dear in MJCF."""
     path = servo(tmp_path, "load_dependent")
@@ -230,6 +289,32 @@ def test_the_compensation_is_the_friction_of_all_shafts_at_the_motor(tmp_path: P
     for speed in (-30.0, -2.0, 5.0, 40.0):
         expected = np.sign(speed) * (0.03 + (0.2 + 0.7 * abs(speed) / 20.0) / 20.0)
         assert compiled.compensate(speed, 1e-9, numbers) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_compensation_is_told_without_a_price_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Name, arguments, whose friction it cancels, and what of the drive it does not."""
+    ripple = {"cosine": 0.1, "sine": 0.0, "period": 1.0}
+    lugre = {"law": "lugre", "tau_c": 0.03, "tau_s": 0.04, "omega_s": 0.1, "sigma0": 100.0, "load": {"coulomb": 0.02}}
+    rough = {"law": "coulomb", "tau_c": 0.2, "ripple": ripple}
+    path = axis(tmp_path, drive__shafts__0__friction=lugre, drive__shafts__1__friction=rough)
+    assert main(["export", str(path), "--to", "c", "--out", str(tmp_path / "a.c"), "--no-price"]) == DONE
+    printed = capsys.readouterr().out
+    width = f"{compensation_width(load_fitted(path)):.3g}"
+    for expected in (
+        "Compensation: axis_compensate(speed, width, axis_identified) returns the torque, N m, at motor that cancels "
+        "the friction of motor, arm in steady motion",
+        "  speed: wanted, of motor, rad/s",
+        f"  width: rad/s, within which it goes through zero; {width} suits the recordings",
+        "  left out: presliding of motor: its level once it slides is taken at once",
+        "  left out: growth of the friction of motor with the load: it is that without load",
+        "  left out: ripple of the friction of arm: its mean over the angle is taken",
+        "  left out: gravity on arm, which is no friction",
+    ):
+        assert f"{expected}\n" in printed
+    header = (tmp_path / "a.h").read_text(encoding="utf-8")
+    assert "   Left out: gravity on arm, which is no friction.\n" in header
+    assert main(["export", str(path), "--to", "urdf", "--out", str(tmp_path / "a.urdf"), "--no-price"]) == DONE
+    assert "Compensation" not in capsys.readouterr().out
 
 
 def test_compensation_is_predicted_to_shrink_the_tracking_error(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from friction_ocp.problem_file.rules.power import sign_of_work
 from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
+from friction_ocp.recording.conditioning import FEWEST_SAMPLES
 from friction_ocp.recording.doubts import starts_over, turnover_text
 from friction_ocp.recording.recording import FloatArray
 
@@ -46,6 +47,27 @@ def recordings_have_names_of_their_own(case: Case) -> Iterator[Finding]:
 
 def _path(use: RecordingUse | StaticUse) -> Path | None:
     return use.recording.path if isinstance(use, RecordingUse) else use.points.path
+
+
+def outputs_have_enough_samples(case: Case) -> Iterator[Finding]:
+    """At least one output of every recording has samples enough to tell the motion from."""
+    for place, use in case.uses():
+        there = [use.recording.channels.get(channel.name) for channel in case.drive.outputs]
+        counts = [int(np.count_nonzero(np.isfinite(item.values))) for item in there if item is not None]
+        if counts and 0 < max(counts) < FEWEST_SAMPLES:
+            what = f"no output has more than {max(counts)} samples"
+            remedy = "record or import more of it"
+            yield Finding(case.at_recording(place, use), what, f"at least {FEWEST_SAMPLES}", remedy)
+
+
+def outputs_move(case: Case) -> Iterator[Finding]:
+    """What is compared changes in at least one training recording, or the machine stood still all the time."""
+    for channel in case.drive.outputs:
+        level = _only_level(case, channel)
+        if level is not None and _pooled(case, channel).size > 1:
+            what = f"output '{channel.name}' never moves: it is {level} throughout all training recordings"
+            remedy = "record motion, or correct which column of the log it is"
+            yield Finding(case.at(f"channels.{channel.name}"), what, remedy=remedy, severity="warning")
 
 
 def recordings_have_the_channels(case: Case) -> Iterator[Finding]:
@@ -162,9 +184,8 @@ def _turned_round(case: Case, channel: Channel, shaft: str, sign: float) -> Iter
         effort = sign * (recorded.values - offset) / gain
         signs[case.at_recording(place, use)] = sign_of_work(motion, recorded.time, effort, heavy)
     fits_elsewhere = 1 in signs.values()
-    jumping = {finding.where for finding in angles_do_not_start_over(case)} if -1 in signs.values() else set[str]()
     for where, found in signs.items():
-        if found < 0 and where not in jumping:
+        if found < 0:
             what = f"channel '{channel.name}' and the motion of shaft '{shaft}' have opposite signs"
             allowed = "a positive torque accelerates in the positive direction"
             remedy = f"set the gain of '{channel.name}' to -1, or correct the sign of the position"
@@ -182,6 +203,8 @@ RECORDINGS: tuple[Rule, ...] = (
     angles_do_not_start_over,
     motors_are_enabled,
     inputs_move,
+    outputs_have_enough_samples,
+    outputs_move,
     current_and_motion_agree,
     drive_torque_and_motion_agree,
 )
