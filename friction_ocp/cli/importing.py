@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ def add_commands(commands: Any) -> None:
 
 
 def _import(options: argparse.Namespace) -> int:
+    from friction_ocp.recording.doubts import doubts_of_import
     from friction_ocp.recording.hdf5 import write_recording, write_static_points
+    from friction_ocp.recording.import_map import load_import_map
     from friction_ocp.recording.import_recording import import_file, inspect_file
     from friction_ocp.recording.recording import Recording
 
@@ -38,6 +41,8 @@ def _import(options: argparse.Namespace) -> int:
     refuse_overwriting(options.out, (options.file, options.map, *options.file.glob("*")))
     found = import_file(options.file, options.map)
     if isinstance(found, Recording):
+        for doubt in doubts_of_import(found, load_import_map(options.map)):
+            print(f"{doubt.severity}: {doubt}", file=sys.stderr)
         write_recording(found, options.out)
         print(f"Recording: {options.out}")
     else:

@@ -52,6 +52,7 @@ def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tu
     """Judge every parameter."""
     unseen = _unseen(space, theta, found)
     partners = _partners(found, ~(found.at_bound | unseen))
+    nothing_excluded = _covers_the_bounds(space, theta, found)
     vague = ~(found.std_error <= MATERIAL * np.abs(theta))
     result: list[Verdict] = []
     for k in range(theta.size):
@@ -61,6 +62,8 @@ def verdicts(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> tu
             result.append(Verdict("not_identifiable"))
         elif partners[k] and vague[k]:
             result.append(Verdict("traded", tuple(space.names[j] for j in partners[k])))
+        elif nothing_excluded[k]:
+            result.append(Verdict("not_identifiable"))
         else:
             result.append(Verdict("ok"))
     return tuple(result)
@@ -77,6 +80,15 @@ def _unseen(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> Boo
     span = space.upper - space.lower
     size = np.where(np.isfinite(span), 0.5 * span, 0.0)
     return (conditional > np.maximum(np.abs(theta), space.scale)) & (conditional > size)
+
+
+def _covers_the_bounds(space: ParameterSpace, theta: FloatArray, found: Uncertainty) -> BoolArray:
+    """Return of which parameters the interval, all others unknown, holds everything that the bounds allow.
+
+    A bound that is infinite is never reached: where there is one, large values are excluded.
+    """
+    low, high = found.interval(theta).T
+    return (low <= space.lower) & (space.upper <= high)
 
 
 def _partners(found: Uncertainty, free: BoolArray) -> list[list[int]]:

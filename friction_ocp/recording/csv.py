@@ -54,11 +54,14 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
         yield ForeignFile(tuple(signals), partial(_read_columns, path, layout), no_clock, summary)
         return
     check_sizes(path, signals)
-    values = _whatever_is_a_number(path, layout)
-    if layout.delimiter != "," and not np.any(np.isfinite(values)):
+    values, commas = _whatever_is_a_number(path, layout), list[str]()
+    if layout.delimiter != ",":
         with_comma = _whatever_is_a_number(path, replace(layout, decimal=","))
-        if np.any(np.isfinite(with_comma)):
-            values, summary = with_comma, f"{summary}, decimal comma (decimal: ',' in the map)"
+        more = np.count_nonzero(np.isfinite(with_comma), axis=1) > np.count_nonzero(np.isfinite(values), axis=1)
+        values[more] = with_comma[more]
+        commas = [f"'{name}'" for name, has in zip(layout.names, more, strict=True) if has]
+    if commas:
+        summary = f"{summary}, decimal comma in {', '.join(commas)} (decimal: ',' in the map)"
     known = [
         replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
         for signal, column in zip(signals, values, strict=True)

@@ -22,8 +22,8 @@ MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
 _KEYS = ("format", "time", "channels", "points", *_TEXTS)
 _COLUMN_KEYS = ("column", "unit", "scale", "wrap", "reset", "instead_of")
-_CHANNEL_KEYS = (*_COLUMN_KEYS, "low_pass", "time")
-_NUMBERS = ("wrap", "reset", "low_pass")
+_CHANNEL_KEYS = (*_COLUMN_KEYS, "held", "low_pass", "time")
+_NUMBERS = ("wrap", "reset", "held", "low_pass")
 _POSITIVE = {"wrap": "65536 or 360", "low_pass": "0.01 s"}
 
 
@@ -36,13 +36,15 @@ class Column:
     unit: str = ""
     """"" takes the unit that the file states."""
     scale: str | None = None
-    """What one count is, such as "2*pi/4096 rad", for unit "counts"."""
+    """What one count is, such as "2*pi/4096 rad"; the unit is "counts" then, stated or not."""
     wrap: float | None = None
     """How much a counter loses when it starts over, in the numbers of the column."""
     reset: float | None = None
     """The value to which a counter is set, in the numbers of the column."""
     instead_of: str = ""
     """The unit that the file states, where `unit` is to be taken instead."""
+    held: float | None = None
+    """How many times each value is repeated until the next one comes; the repeats become missing samples."""
     low_pass: float | None = None
     """Time constant, s, of the first-order filter through which the logger reports it; it is undone."""
     time: Column | None = None
@@ -177,6 +179,11 @@ class _MapReader:
         for key, example in _POSITIVE.items():
             if numbers.get(key) is not None and not cast(float, numbers[key]) > 0.0:
                 self.report(f"{place}.{key}", f"{key} is {keys[key]!r}", f"a number above 0, such as {example}")
+        held = numbers.get("held")
+        if held is not None and not (held >= 2.0 and held.is_integer()):
+            self.report(f"{place}.held", f"held is {keys['held']!r}", "a whole number of samples from 2 on, such as 10")
+        if "scale" in texts:
+            texts.setdefault("unit", "counts")
         time = self.time(f"{place}.time", keys["time"]) if "time" in keys else None
         return Column(name, **cast(dict[str, Any], texts | numbers), time=time)
 
@@ -188,7 +195,7 @@ class _MapReader:
         return None
 
     def dimension(self, place: str, column: Column) -> str | None:
-        if not column.unit and column.scale is None:
+        if not column.unit:
             return None
         try:
             return dimension_of(to_si((), column.unit, f"{self.where}: {place}", scale=column.scale)[1])

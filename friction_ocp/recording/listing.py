@@ -8,9 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from friction_ocp.errors import FrictionOcpError
+from friction_ocp.quantities import dimension_of, to_si
 from friction_ocp.recording.counters import looks_like_counter
 from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, is_real
 from friction_ocp.recording.recording import FloatArray
+from friction_ocp.recording.sampling import held_for
 
 READ_SAMPLES = 20_000_000
 """Samples in a file up to which all values are looked at, not only the times."""
@@ -22,13 +25,30 @@ class Listed:
 
     signal: Signal
     rate: float | None
-    """Samples per s (median), where the file or its first increasing column gives times."""
+    """Samples per s (median) that are not missing, where the file or an increasing column gives times."""
     seconds: float | None
-    """From the first sample to the last."""
+    """From the first of them to the last."""
     low: float | None = None
     high: float | None = None
     turn: float | None = None
     """What it seems to lose each time it starts over."""
+    held: int | None = None
+    """How many times each value is repeated, where that is so."""
+    empty: int = 0
+    """Samples that are missing."""
+    timed_by: str = ""
+    """The column that was taken for the time, and its unit; "" where the file has a time axis, or there is none."""
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Times of a signal, s, and what `Listed.timed_by` says of them."""
+
+    time: FloatArray
+    timed_by: str = ""
+
+
+_NO_TIMES = _Axis(np.empty(0))
 
 
 def list_signals(file: ForeignFile, path: Path) -> tuple[Listed, ...]:
@@ -39,10 +59,15 @@ def list_signals(file: ForeignFile, path: Path) -> tuple[Listed, ...]:
         check_sizes(path, [file.signals[k] for k in numeric])
         found = {k: column for k, column in file.read(numeric).items() if is_real(column)}
         values = {k: np.asarray(column, dtype=np.float64) for k, column in found.items()}
-    axes = {clock: file.clock(clock) for clock in dict.fromkeys(signal.clock for signal in file.signals) if clock}
-    guessed = _guessed_time(file.signals, values)
-    axes[""] = values[guessed] if guessed is not None else np.empty(0)
-    return tuple(_listed(signal, axes[signal.clock], values.get(k)) for k, signal in enumerate(file.signals))
+    clocks = dict.fromkeys(signal.clock for signal in file.signals if signal.clock)
+    axes = {clock: _Axis(file.clock(clock)) for clock in clocks}
+    guessed = {k: _as_time(file.signals[k], column) for k, column in values.items() if not file.signals[k].clock}
+    times = {k: axis for k, axis in guessed.items() if axis is not None}
+
+    def axis_of(k: int, signal: Signal) -> _Axis:
+        return axes[signal.clock] if signal.clock else _guessed_axis(k, signal, file.signals, times)
+
+    return tuple(_listed(signal, axis_of(k, signal), values.get(k)) for k, signal in enumerate(file.signals))
 
 
 def describe(file: ForeignFile, path: Path) -> str:
@@ -50,39 +75,74 @@ def describe(file: ForeignFile, path: Path) -> str:
     listed = list_signals(file, path)
     count = f"{len(listed)} column" + ("s" if len(listed) != 1 else "")
     lines = [f"{path}: {count}" + (f", {file.summary}" if file.summary else "")]
-    if any(item.rate is not None and not item.signal.clock for item in listed):
-        lines.append("Rates and lengths hold if the first increasing column is the time, in s.")
+    guesses = list(dict.fromkeys(item.timed_by for item in listed if item.timed_by))
+    if guesses:
+        lines.append(f"Rates and lengths hold if times are in {', '.join(guesses)}.")
     if file.origin:
         lines.append(f"Times count from {file.origin}.")
     heads = ("", "column", "unit", "samples", "per s", "s", "lowest", "highest", "")
     return "\n".join([*lines, *_aligned([heads, *(_cells(k, item) for k, item in enumerate(listed))])])
 
 
-def _guessed_time(signals: Sequence[Signal], values: dict[int, FloatArray]) -> int | None:
-    """Return the first column that always grows, where the file names no time axis."""
-    for k, column in values.items():
-        if not signals[k].clock and len(column) > 1 and bool(np.all(np.diff(column) > 0.0)):
-            return k
-    return None
+def _as_time(signal: Signal, column: FloatArray) -> _Axis | None:
+    """Return a column as a time axis where it always grows and its unit, if it has one, is one of time."""
+    present = column[np.isfinite(column)]
+    if len(present) < 2 or not bool(np.all(np.diff(present) > 0.0)):
+        return None
+    seconds, unit = (to_si(column, signal.unit)[0], signal.unit) if _is_time(signal) else (column, "s")
+    return _Axis(seconds, f"'{signal.name}' ({unit})") if _is_time(signal) or not signal.unit else None
 
 
-def _listed(signal: Signal, time: FloatArray, values: FloatArray | None) -> Listed:
-    step = float(np.median(np.diff(time))) if len(time) > 1 and len(time) == signal.samples else 0.0
+def _is_time(signal: Signal) -> bool:
+    try:
+        return bool(signal.unit) and dimension_of(signal.unit) == "time"
+    except FrictionOcpError:
+        return False
+
+
+def _guessed_axis(k: int, signal: Signal, signals: Sequence[Signal], times: dict[int, _Axis]) -> _Axis:
+    """Return the likely times of a signal that has none of its own: a column that is as long.
+
+    That is the nearest one before it among those that are known to be times, else the first of all.
+    """
+    fitting = [j for j in times if signals[j].samples == signal.samples]
+    known = [j for j in fitting if _is_time(signals[j])]
+    before = [j for j in known if j <= k]
+    return times[before[-1] if before else (*known, *fitting)[0]] if fitting else _NO_TIMES
+
+
+def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:
+    present = np.ones(signal.samples, dtype=bool) if values is None else np.isfinite(values)
+    time = axis.time[present] if len(axis.time) == present.size else np.empty(0)
+    counter = None
+    if values is not None:
+        timed = len(time) == np.count_nonzero(present) and bool(np.all(np.isfinite(time)))
+        counter = looks_like_counter(values[present], time if timed else None)
+    time = time[np.isfinite(time)]
+    step = float(np.quantile(np.diff(time), 0.5, method="lower")) if len(time) > 1 else 0.0
     rate, seconds = (1.0 / step, float(time[-1] - time[0])) if step > 0.0 else (None, None)
-    present = np.empty(0) if values is None else values[np.isfinite(values)]
-    if not present.size:
-        return Listed(signal, rate, seconds)
-    turn = looks_like_counter(present)
-    return Listed(signal, rate, seconds, float(present.min()), float(present.max()), turn)
+    timed_by = "" if rate is None else axis.timed_by
+    if values is None or not present.any():
+        return Listed(signal, rate, seconds, timed_by=timed_by)
+    seen = values[present]
+    empty = int(np.count_nonzero(~present))
+    turn = None if counter is None else counter.turn
+    held = held_for(values)
+    return Listed(signal, rate, seconds, float(seen.min()), float(seen.max()), turn, held, empty, timed_by)
 
 
 def _cells(index: int, item: Listed) -> tuple[str, ...]:
     numbers = (item.rate, item.seconds, item.low, item.high)
-    note = "" if item.turn is None else f"starts over: wrap: {item.turn:.10g}?"
+    notes = [] if item.turn is None else [f"starts over: wrap: {item.turn:.10g}?"]
+    if item.held is not None:
+        new = "" if item.rate is None else f", {item.rate / item.held:.6g} new ones per s"
+        notes.append(f"repeats every value: held: {item.held}?{new}")
+    if item.empty:
+        notes.append(f"{item.empty} empty")
     if not item.signal.numeric:
-        note = "no numbers"
+        notes = ["no numbers"]
     texts = ("" if number is None else f"{number:.6g}" for number in numbers)
-    return (str(index), item.signal.name, item.signal.unit, str(item.signal.samples), *texts, note)
+    return (str(index), item.signal.name, item.signal.unit, str(item.signal.samples), *texts, ", ".join(notes))
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.attribute_text import attribute_text
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, no_clock, opened, reading
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 
 h5py: Any = _h5py  # its own types are incomplete
@@ -86,6 +87,7 @@ def _signal(node: Any, name: str, samples: int) -> Signal:
     unit = attribute_text(next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), ""))
     matlab_class = node.attrs.get("MATLAB_class", b"")
     text = matlab_class in (b"char", "char") or node.attrs.get("MATLAB_empty", 0)
+    unit = unit or header_unit(name)
     return Signal(name, samples, unit, numeric=node.dtype.kind in "biuf" and not text)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, library, opened, reading
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
@@ -47,7 +48,7 @@ def _signal(file: Any, group: int, index: int) -> Signal:
     twice = len(file.channels_db.get(channel.name, ())) > 1
     name = f"{channel.name} (group {group})" if twice else str(channel.name)
     conversion = getattr(channel, "conversion", None)
-    unit = str(channel.unit or getattr(conversion, "unit", "") or "")
+    unit = str(channel.unit or getattr(conversion, "unit", "") or header_unit(str(channel.name)))
     clock = f"group {group}" if group in file.masters_db else ""
     return Signal(name, int(content.channel_group.cycles_nr), unit, clock, numeric=_is_numeric(file, group, index))
 

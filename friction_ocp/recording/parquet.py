@@ -1,4 +1,4 @@
-"""Parquet files: columns of numbers and instants; units stand in the metadata of a column."""
+"""Parquet files: columns of numbers and instants; units stand in the metadata of a column, or in its name."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, instant, library, no_clock, opened, reading
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 
 KIND = "a Parquet file"
@@ -46,6 +47,7 @@ class _Reader:
         metadata: Mapping[bytes, bytes] = field.metadata or {}
         stated = next((metadata[key].decode(errors="replace") for key in _UNIT_KEYS if key in metadata), "")
         unit = "s" if self._is_date(field.type) or self._is_span(field.type) else stated
+        unit = unit or header_unit(field.name)
         return Signal(field.name, self.file.metadata.num_rows, unit, numeric=self._is_numeric(field.type))
 
     def origin(self, fields: Sequence[Any]) -> int:

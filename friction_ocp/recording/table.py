@@ -17,10 +17,11 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.checks import check_recording, check_static_points
 from friction_ocp.recording.conditioning import without_low_pass
-from friction_ocp.recording.counters import unroll
+from friction_ocp.recording.counters import looks_like_counter, unroll
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
+from friction_ocp.recording.sampling import first_of_each
 from friction_ocp.recording.static_points import StaticPoints
 
 EXACT_INTEGERS = 2**53
@@ -211,11 +212,23 @@ def _converted(raw: Values, item: _Wanted, origin: int, path: Path) -> tuple[Flo
     if not is_real(raw):
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' holds no real numbers but {raw.dtype}"))
     counted = _since(raw, origin, _nanoseconds(item)) if origin else np.asarray(raw, dtype=np.float64)
+    if _is_time(item.place) and item.entry.wrap is None and item.entry.reset is None:
+        _refuse_turnover(counted, item, where)
     values = unroll(counted, item.entry.wrap, item.entry.reset, where)
+    if item.entry.held is not None:
+        values = first_of_each(values, int(item.entry.held), where)
     converted, unit = to_si(values, item.unit, where, scale=item.entry.scale)
     if _is_time(item.place) and unit != "s":
         raise FrictionOcpError(Finding(where, f"'{item.signal.name}' is in {item.unit}", "a unit such as s, ms or us"))
     return converted, unit
+
+
+def _refuse_turnover(counted: FloatArray, item: _Wanted, where: str) -> None:
+    counter = looks_like_counter(counted)
+    if counter is not None:
+        at = counter.samples[0]
+        what = f"'{item.signal.name}' starts over at sample {at} ({counted[at]:.10g} after {counted[at - 1]:.10g})"
+        raise FrictionOcpError(Finding(where, what, "times that only grow", f"state `wrap: {counter.turn:.10g}`"))
 
 
 def _channels(
@@ -225,6 +238,7 @@ def _channels(
     values: Mapping[str, tuple[FloatArray, str]],
 ) -> dict[str, Channel]:
     """Give every channel its values and its time axis; equal axes are one clock, the first of them `time`."""
+    values = _without_empty_rows(import_map, values)
     axes: dict[str, FloatArray] = {}
     if import_map.time is not None and any(entry.time is None for entry in import_map.channels.values()):
         axes["time"] = values["time"][0]
@@ -246,6 +260,21 @@ def _channels(
             series = without_low_pass(axes[clock], series, entry.low_pass)
         channels[name] = Channel(name, axes[clock], series, unit, clock=clock)
     return channels
+
+
+def _without_empty_rows(
+    import_map: ImportMap, values: Mapping[str, tuple[FloatArray, str]]
+) -> dict[str, tuple[FloatArray, str]]:
+    """Leave out where a time axis of the map and all that stands over it have no number: other channels go on there."""
+    users = {f"channels.{name}.time": [f"channels.{name}"] for name in import_map.channels}
+    users["time"] = [f"channels.{name}" for name, entry in import_map.channels.items() if entry.time is None]
+    result = dict(values)
+    for time, channels in users.items():
+        places = [time, *channels] if time in values else []
+        if len({values[place][0].size for place in places}) == 1:
+            kept = np.any([np.isfinite(values[place][0]) for place in places], axis=0)
+            result |= {place: (values[place][0][kept], values[place][1]) for place in places}
+    return result
 
 
 def _clock_name(label: str, taken: Mapping[str, FloatArray]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.recording.foreign import ForeignFile, Signal, Values, instant, library, opened, reading, seconds_since
+from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
@@ -48,7 +49,7 @@ def open_tdms(path: Path, import_map: ImportMap | None = None) -> Generator[Fore
 def _signal(channel: Any, clock: str) -> Signal:
     unit = next((str(channel.properties[key]) for key in _UNIT_KEYS if channel.properties.get(key)), "")
     numeric = channel.dtype is not None and np.dtype(channel.dtype).kind in "biuf"
-    name = f"{channel.group_name}/{channel.name}"
+    name, unit = f"{channel.group_name}/{channel.name}", unit or header_unit(str(channel.name))
     if _is_date(channel):
         return Signal(name, len(channel), "s")
     return Signal(name, len(channel), unit, clock, numeric)

@@ -34,6 +34,8 @@ class ParameterRow:
     unit_text: str
     value: Cell
     interval: Cell
+    relative: Cell
+    """Half of the interval over the value."""
     std_error: Cell
     guess: Cell
     verdict: str
@@ -82,6 +84,7 @@ def _parameter_row(name: str, parameter: Json) -> ParameterRow:
         unit_text=unit_text(unit),
         value=Cell(to_resolution(value, std_error), _key(value)),
         interval=_interval(rows(parameter, "interval95"), std_error),
+        relative=_relative(value, rows(parameter, "interval95")),
         std_error=Cell(significant(std_error, 2), _key(std_error)),
         guess=Cell(plain(parameter.get("guess")), _key(parameter.get("guess"))),
         verdict=verdict if verdict in _SIGNS else "other",
@@ -102,6 +105,14 @@ def _interval(bounds: Sequence[Any], std_error: Any) -> Cell:
     )
     width = bounds[1] - bounds[0] if all(is_number(bound) for bound in bounds) else None
     return Cell(f"[{first}, {last}]", width)
+
+
+def _relative(value: Any, bounds: Sequence[Any]) -> Cell:
+    """Return half of an interval as a share of the value; nothing where a side is open or the value is zero."""
+    if len(bounds) != 2 or not value or not all(is_number(item) for item in (value, *bounds)):
+        return Cell(NOTHING)
+    share = 0.5 * (bounds[1] - bounds[0]) / abs(value)
+    return Cell(f"± {percent(share, 2)}", share)
 
 
 def _key(value: Any) -> float | None:

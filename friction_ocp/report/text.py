@@ -11,7 +11,9 @@ from friction_ocp.report.section import Column, StatisticTable, table_lines
 from friction_ocp.report.statistics import statistic_section, whole_verdict
 from friction_ocp.report.tables import parameter_rows
 
-_HEADS = ("parameter", "value", "95 % interval", "unit", "verdict")
+_HEADS = ("parameter", "value", "95 % interval", "relative", "unit", "verdict")
+
+_NUMBERS = _HEADS[1:4]
 
 
 def summary(result: Mapping[str, Any]) -> str:
@@ -40,8 +42,11 @@ def summary(result: Mapping[str, Any]) -> str:
 def _parameter_lines(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     if not parameters:
         return []
-    found = [(row.name, row.value.text, row.interval.text, row.unit, row.verdict) for row in parameter_rows(parameters)]
-    heads = (Column(head, number) for head, number in zip(_HEADS, (False, True, True, False, False), strict=True))
+    found = [
+        (row.name, row.value.text, row.interval.text, row.relative.text, row.unit, row.verdict)
+        for row in parameter_rows(parameters)
+    ]
+    heads = (Column(head, head in _NUMBERS) for head in _HEADS)
     return [*table_lines(StatisticTable("", tuple(heads), tuple(found))), ""]
 
 

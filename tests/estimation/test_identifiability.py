@@ -91,6 +91,21 @@ def test_a_parameter_known_to_half_of_its_bounds_is_not_identifiable() -> None:
     assert (weak, strong) == ("not_identifiable", "ok")
 
 
+def test_an_interval_over_all_of_the_bounds_is_not_identifiable() -> None:
+    """Alone a parameter may be known, but not beside the others: where nothing is excluded then, nothing is told.
+
+    Two regressors of unit norm at an angle of cosine c leave sqrt(1 - c^2) of what tells each alone.
+    """
+    x = independent(2)
+    cosine = 0.99
+    x[:, 1] = cosine * x[:, 0] + np.sqrt(1 - cosine**2) * x[:, 1]
+    theta, std_error = np.array([0.5, 0.5]), 0.5 / 1.96
+    strength = 1.0 / (std_error * np.sqrt(1 - cosine**2))
+    words = {factor: [item.word for item in judge(factor * strength * x, theta, 0.0, 1.0)] for factor in (0.98, 1.02)}
+    assert words == {0.98: ["not_identifiable"] * 2, 1.02: ["ok"] * 2}
+    assert judge(0.98 * strength * x, theta, 0.0, np.inf) == (OK, OK)
+
+
 def test_a_bound_comes_first() -> None:
     """A parameter at its bound is judged so, and does not count among the partners of others."""
     x = 100 * independent(3)

@@ -391,6 +391,18 @@ def speed_in_degrees(file: Any) -> None:
     file["/channels/second"].attrs["unit"] = "rad/s"
 
 
+def interrupted(file: Any) -> None:
+    """Leave the samples from 2.0 s to 2.8 s out of everything."""
+    for name in ("position", "current", "time"):
+        channel(name, lambda y: np.delete(y, slice(1000, 1400)))(file)
+
+
+def with_holes(values: Any) -> Any:
+    """Return values of which two stretches are missing."""
+    values[500:700] = values[2000:2100] = np.nan
+    return values
+
+
 def backwards(time: Any) -> Any:
     return np.where(np.arange(time.size) == 100, time[98], time)
 
@@ -408,6 +420,14 @@ RECORDING_FAULTS: dict[str, tuple[Callable[[Any], None], str]] = {
     "no unit": (channel("position", lambda y: y, unit=""), "channel 'position' has no unit"),
     "time backwards": (channel("time", backwards), "time is not increasing at sample 100 (0.1960 s after 0.1980 s)"),
     "all NaN": (channel("position", lambda y: y * np.nan), "channel 'position' has no value: all 3000 samples are NaN"),
+    "counter that starts over": (
+        channel("position", lambda y: 1e-5 * (np.round(y / 1e-5) % 65536)),
+        "channel 'position' jumps 16 times by 0.65536 rad, 65536 steps of its resolution, within one sample, first at ",
+    ),
+    "angle that starts over": (
+        channel("position", lambda y: np.arctan2(np.sin(9 * y), np.cos(9 * y))),
+        "by one turn, 6.28319 rad, within one sample, first at ",
+    ),
     "clipped output": (
         channel("position", lambda y: np.clip(y, 0.8 * y.min(), 0.8 * y.max())),
         "channel 'position' is clipped: it stays at its extremes of ",
@@ -440,6 +460,13 @@ def test_fault_of_a_recording_is_found(workshop: Workshop, name: str) -> None:
     assert len([message for message in messages if expected in message]) == 1, "\n".join(messages)
     place = "channels.current" if name == "still input" else f"recordings.train[0]: {workshop.folder}/sweep.h5"
     assert f"problem.yaml: {place}: " in messages[0]
+
+
+def test_a_counter_that_starts_over_is_not_told_as_a_wrong_sign(workshop: Workshop) -> None:
+    """What is wrong with a motion of jumps is the jumps, whatever the work seems to be."""
+    workshop.recording(spoil=channel("position", lambda y: (np.round((y + 0.5) * 65536) % 65536) / 65536))
+    messages = workshop.messages(workshop.problem())
+    assert ["it starts over like a counter" in text for text in messages] == [True]
 
 
 def test_a_sign_is_wrong_in_all_recordings_or_not_at_all(workshop: Workshop) -> None:
@@ -631,6 +658,22 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("channels/current/hold", "zero"),
         "sweep.h5: a sample every 2 s; time in s; correct the time axis if it is in ms",
     ),
+    "interruption": (
+        put("channels/current/noise_std", 1e-3),
+        "no samples of 'current', 'position' from 1.9980 s to 2.8000 s, 0.802 s where 0.002 s is usual; inputs",
+    ),
+    "missing samples": (
+        put("channels/current/hold", "zero"),
+        "no samples of 'position' from 0.9980 s to 1.4000 s, 0.402 s where 0.002 s is usual (the longest of 2 gaps); ",
+    ),
+    "repeated measurement": (
+        put("channels/current/hold", "zero"),
+        "'position' repeats every value 5 times: a new one comes every 0.01 s, not every 0.002 s; the repeats count as",
+    ),
+    "repeated command": (
+        put("channels/current/noise_std", 1e-3),
+        "state `hold: zero` if it is a command that the drive holds, else import it again with `held: 10` in its map",
+    ),
     "validated on the training data": (
         put("recordings/validation", ["sweep.h5"]),
         "this file also stands in recordings.tr",
@@ -646,6 +689,10 @@ DOUBTFUL: dict[str, Callable[[Any], None]] = {
     "resolution in another unit": channel("position", lambda y: 1e-3 * np.round(y / 1e-3)),
     "two sensors of one shaft in different units": speed_in_degrees,
     "time in milliseconds": channel("time", lambda t: 1e3 * t),
+    "interruption": interrupted,
+    "missing samples": channel("position", with_holes),
+    "repeated measurement": channel("position", lambda y: np.repeat(y[::5], 5)),
+    "repeated command": channel("current", lambda y: np.repeat(y[::10], 10)),
 }
 """Recordings that go with the doubtful problems."""
 

@@ -101,6 +101,21 @@ def test_a_decimal_comma_is_seen_by_inspect(tmp_path: Path) -> None:
     assert "2.5" in told
 
 
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_a_decimal_comma_beside_integers_is_seen_by_inspect(tmp_path: Path, delimiter: str) -> None:
+    """Commas in one column alone, among whole numbers of its own and of others, are numbers of the listing too."""
+    rows = [f"{k}{delimiter}{k % 3}{delimiter}{k / 4:g}".replace(".", ",") for k in range(12)]
+    path = put(tmp_path / "a.csv", delimiter.join(["t [ms]", "n", "x [A]"]) + "\n" + "\n".join(rows))
+    told = inspect_file(path)
+    assert "decimal comma in 'x [A]' (decimal: ',' in the map)" in told
+    with open_csv(path) as file:
+        _, n, x = list_signals(file, path)
+    assert (n.high, x.low, x.high) == (2.0, 0.0, 2.75)
+    import_map = ImportMap(Column(0, "ms"), {"x": Column(2, "A"), "n": Column(1, "1")}, decimal=",")
+    read = read_csv(path, import_map).channels
+    assert (read["x"].values.tolist(), read["n"].values[:4].tolist()) == ([k / 4 for k in range(12)], [0, 1, 2, 0])
+
+
 def test_decimal_comma_is_read_where_stated(tmp_path: Path) -> None:
     """With decimal: ',' a comma is the decimal sign; without it the finding says so."""
     content = "timestamp;pos;cur\n0,0;1,5;2\n0,5;2,5;3\n"
@@ -210,6 +225,7 @@ def map_of(**changes: str) -> str:
             "channels.x: unknown key 'gain'; available: column, unit, scale",
         ),
         ({"channels": "{x: {column: x, unit: A, wrap: 0}}"}, "channels.x.wrap: wrap is 0; a number above 0"),
+        ({"channels": "{x: {column: x, unit: A, held: 2.5}}"}, "channels.x.held: held is 2.5; a whole number of"),
         ({"channels": "{x: {column: x, unit: A, wrap: .nan}}"}, "channels.x.wrap: this is nan; a number"),
         ({"channels": "{x: {column: x, unit: A, time: {column: t, unit: A}}}"}, "channels.x.time: unit 'A' does not"),
         ({"channels": "{a/b: {column: x, unit: A}}"}, "channels.a/b: the name has a slash"),

@@ -55,7 +55,40 @@ def test_inspection_tells_name_unit_rate_and_length(tmp_path: Path, name: str) -
         row = next(row for row in rows if f"  {entry['column']}  " in row).split()
         assert ("deg" in row or "mA" in row) == case.units_in_file
         assert {"400", "100"} & set(row)
-        assert {"200", "50"} & set(row) or name.startswith(("matlab", "json", "npz"))
+        assert {"200", "50"} & set(row)
+
+
+def test_units_and_times_in_the_names_of_columns_are_taken(tmp_path: Path) -> None:
+    """Columns of Parquet that are called `angle [deg]` need no unit in the map, and give rates in the unit of time."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    late = np.where(np.arange(400) % 4 == 0, np.repeat(current(), 4), np.nan)
+    table = pa.table({"time [ms]": 1e3 * fast(), "angle [deg]": angle(), "current (mA)": late})
+    pq.write_table(table, tmp_path / "run.parquet")
+    told = [row.split() for row in inspect_file(tmp_path / "run.parquet").splitlines()]
+    assert told[1][-2:] == ["[ms]'", "(ms)."]
+    assert [row[3:6] for row in told[3:]] == [["ms", "400", "200"], ["deg", "400", "200"], ["mA", "400", "50"]]
+    assert told[5][-2:] == ["300", "empty"]
+    case = ForeignCase(lambda folder: folder / "run.parquet", {"angle": {"column": 1}}, {"column": 0})
+    seen = import_recording(tmp_path / "run.parquet", case.map(tmp_path)).channels["angle"]
+    np.testing.assert_allclose(seen.time, fast(), rtol=ROUNDING)
+    np.testing.assert_allclose(seen.values, np.deg2rad(angle()), rtol=ROUNDING)
+
+
+def test_a_scale_alone_is_that_of_counts(tmp_path: Path) -> None:
+    """A channel that its file calls counts needs no more than the scale."""
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append([Signal(np.arange(400, dtype=np.uint16), fast(), name="encoder", unit="counts")])
+        file.save(tmp_path / "run.mf4")
+    entry = {"column": "encoder", "scale": "2*pi/400 rad"}
+    case = ForeignCase(lambda folder: folder / "run.mf4", {"angle": entry})
+    values = import_recording(tmp_path / "run.mf4", case.map(tmp_path)).channels["angle"].values
+    np.testing.assert_allclose(values, 2.0 * np.pi / 400.0 * np.arange(400), rtol=ROUNDING)
+    without = ForeignCase(case.write, {"angle": {"column": "encoder"}})
+    assert "unit 'counts' has no scale; counts need a stated scale" in refusal(without, tmp_path)
 
 
 def test_dates_count_from_the_first(tmp_path: Path) -> None:
@@ -214,6 +247,77 @@ def test_wraps_are_unrolled(tmp_path: Path, turn: float) -> None:
     assert f"near half of wrap = {0.15 * turn:.6g}; steps of" in refusal(case, tmp_path, wrap=0.15 * turn)
 
 
+def test_a_forgotten_wrap_is_told_with_what_to_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The import of an encoder of 16 bits that starts over says how often, and what the map lacks; with it, nothing."""
+    turns = np.round(2e5 * np.sin(6.0 * fast()) + 1e5).astype(int) % 65536
+    rows = "".join(f"{t:.3f},{n}\n" for t, n in zip(fast(), turns, strict=True))
+    (tmp_path / "run.csv").write_text("t,n\n" + rows)
+    entry = {"column": "n", "unit": "counts", "scale": "2*pi/4096 rad"}
+    time = {"column": "t", "unit": "s"}
+    jumps = np.count_nonzero(np.abs(np.diff(turns)) > 32768)
+    for more, told in (({}, True), ({"wrap": 65536}, False)):
+        case = ForeignCase(lambda folder: folder / "run.csv", {"angle": {**entry, **more}}, time)
+        arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+        assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+        said = capsys.readouterr().err
+        assert (f"map.yaml: channels.angle: channel 'angle' jumps {jumps} times by 100.531 rad" in said) == told
+        assert ("write `wrap: 65536` there" in said) == told
+
+
+def test_an_interrupted_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The import of a log that pauses for 0.8 s says where, and what becomes of it."""
+    kept = np.delete(np.arange(400), slice(100, 260))
+    rows = "".join(f"{fast()[k]:.3f},{angle()[k]}\n" for k in kept.tolist())
+    (tmp_path / "run.csv").write_text("t,x\n" + rows)
+    channels = {"angle": {"column": "x", "unit": "deg"}}
+    case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+    arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+    assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+    said = capsys.readouterr().err
+    assert "run.csv: no samples of 'angle' from 0.4950 s to 1.3000 s, 0.805 s where 0.005 s is usual; inputs" in said
+
+
+def test_values_of_a_slower_logger_are_told_and_thinned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A current of 50 Hz in rows of 200 Hz is told by --inspect and by the import; `held` keeps each value once."""
+    rows = zip(fast().tolist(), angle().tolist(), np.repeat(current(), 4).tolist(), strict=True)
+    (tmp_path / "run.csv").write_text("t,x,i\n" + "".join(f"{t:.3f},{x},{i}\n" for t, x, i in rows))
+    listed = inspect_file(tmp_path / "run.csv").splitlines()
+    assert [" held: " in row for row in listed[3:]] == [False, False, True]
+    assert listed[5].endswith("repeats every value: held: 4?, 50 new ones per s")
+    for more, told in (({}, True), ({"held": 4}, False)):
+        channels = {"angle": {"column": "x", "unit": "deg"}, "current": {"column": "i", "unit": "mA", **more}}
+        case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+        arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+        assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+        said = capsys.readouterr().err
+        assert (
+            "channel 'current' repeats every value 4 times: a new one comes every 0.02 s, not every" in said
+        ) == told
+        assert ("write `held: 4` there" in said) == told
+    values = read_recording(tmp_path / "out.h5").channels["current"].values
+    np.testing.assert_allclose(values[::4], 1e-3 * current(), rtol=ROUNDING)
+    assert np.count_nonzero(np.isfinite(values)) == 100
+
+
+def test_empty_cells_beside_a_time_of_its_own_are_no_samples(tmp_path: Path) -> None:
+    """Of two loggers in one table the slower one fills few rows: it gets a clock with those alone."""
+    cells = [f"{t:.3f},{i}" for t, i in zip(slow().tolist(), current().tolist(), strict=True)]
+    for layout in ("spread", "first"):
+        beside = {4 * k if layout == "spread" else k: text for k, text in enumerate(cells)}
+        rows = (f"{t:.3f},{x},{beside.get(k, ',')}\n" for k, (t, x) in enumerate(zip(fast(), angle(), strict=True)))
+        (tmp_path / "run.csv").write_text("t,x,t2,i\n" + "".join(rows))
+        own = {"column": "t2", "unit": "s"}
+        channels = {"angle": {"column": "x", "unit": "deg"}, "current": {"column": "i", "unit": "mA", "time": own}}
+        case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+        seen = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels
+        np.testing.assert_allclose(seen["current"].time, slow(), atol=ROUNDING)
+        np.testing.assert_allclose(seen["current"].values, 1e-3 * current(), rtol=ROUNDING)
+        assert (seen["angle"].time.size, seen["current"].clock) == (400, "t2")
+    (tmp_path / "run.csv").write_text("t,x,t2,i\n0,1,0,1\n1,2,,2\n2,3,2,3\n")
+    with pytest.raises(FrictionOcpError, match=r"clock 't2' is not finite at sample 1 \(1 of 3 samples\)"):
+        import_recording(tmp_path / "run.csv", tmp_path / "map.yaml")
+
+
 def test_a_filter_of_the_logger_is_undone(tmp_path: Path) -> None:
     """A step seen through a first-order filter is a step again, and a time constant of zero is refused."""
     time = 0.01 * np.arange(100)
@@ -239,6 +343,10 @@ def test_clocks_that_start_over_go_on(tmp_path: Path) -> None:
         case = ForeignCase(lambda folder: folder / "run.csv", {"x": {"column": "x", "unit": "A"}}, time)
         found = import_recording(tmp_path / "run.csv", case.map(tmp_path)).channels["x"].time
         np.testing.assert_allclose(np.diff(found), 0.01, rtol=1e-9)
+    case = ForeignCase(case.write, {"angle": {"column": "x", "unit": "A"}}, {"column": "a", "unit": "us"})
+    assert "'a' starts over at sample 50 (0 after 4294957296); times that only grow; state `wrap: 4294967296`" in (
+        refusal(case, tmp_path)
+    )
 
 
 def test_a_reset_counter_goes_on_at_its_speed(tmp_path: Path) -> None:
@@ -294,7 +402,7 @@ def test_json_tells_single_values_and_tables_of_number_over_number(tmp_path: Pat
     assert "4 columns, JSON; beside them mass = 0.49" in shown
     rows = {row.split()[1]: row.split() for row in shown.splitlines()[1:] if row[:1].isdigit()}
     assert rows["speed.key"][-2:] == ["1", "2.5"] and rows["speed.value"][-2:] == ["0.53", "1.12"]
-    assert rows["t"][-2:] == ["0", "1"] and rows["mode"][-2:] == ["no", "numbers"]
+    assert rows["t"][-4:] == ["0", "1", "1", "empty"] and rows["mode"][-2:] == ["no", "numbers"]
 
 
 def test_objects_of_numpy_are_not_unpickled(tmp_path: Path) -> None:

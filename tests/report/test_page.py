@@ -211,10 +211,13 @@ def test_the_summary_in_the_terminal_has_the_digits_of_the_page() -> None:
     lines = summary(result).splitlines()
     row = parameter_rows(result["parameters"])[0]
     line = next(line for line in lines if line.startswith(f"{row.name} "))
-    for text in (row.value.text, row.interval.text, row.unit, row.verdict):
+    low, high = result["parameters"][row.name]["interval95"]
+    share = 0.5 * (high - low) / result["parameters"][row.name]["value"]
+    assert row.relative.text == f"± {100 * share:.2g} %"
+    for text in (row.value.text, row.interval.text, row.relative.text, row.unit, row.verdict):
         assert text in line
     assert next(line for line in lines if line.startswith("parameter")).split() == [
-        *("parameter", "value", "95", "%", "interval", "unit", "verdict")
+        *("parameter", "value", "95", "%", "interval", "relative", "unit", "verdict")
     ]
 
 

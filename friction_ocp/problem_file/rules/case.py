@@ -20,6 +20,7 @@ from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import resolve_ties
 from friction_ocp.parameters import Leaf, Tie, leaves, start_of
 from friction_ocp.recording.conditioning import smooth_motion
+from friction_ocp.recording.doubts import starts_over
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
 
@@ -224,6 +225,8 @@ class Case:
         recorded = use.recording.channels.get(channel.name)
         gain, offset = (self.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
         if recorded is None or not _is_usable(recorded) or not abs(gain) > 0:
+            return None
+        if channel.signal == "theta" and starts_over(recorded):  # jumps are no motion, and told by a rule
             return None
         with np.errstate(all="ignore"):  # absurd values come out as not finite
             value, slope, _ = smooth_motion(recorded.time, (recorded.values - offset) / gain)

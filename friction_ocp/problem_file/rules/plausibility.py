@@ -13,6 +13,7 @@ from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise
+from friction_ocp.recording.doubts import ACROSS_GAPS, AS_NEW, gap_texts, repeats, repeats_text
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
 
@@ -127,9 +128,33 @@ def samples_come_often_enough(case: Case) -> Iterator[Finding]:
             yield Finding(where, what, "time in s", "correct the time axis if it is in ms", "warning")
 
 
+def samples_have_no_gaps(case: Case) -> Iterator[Finding]:
+    """Where a recording was interrupted, nobody knows what drove the machine; held inputs may come when they change."""
+    steady = [channel.name for channel in case.drive.channels if channel.role == "output" or channel.hold == "linear"]
+    for place, use in case.uses():
+        known = [use.recording.channels[name] for name in steady if name in use.recording.channels]
+        for text in gap_texts(known):
+            remedy = "split the recording there if the machine moved meanwhile"
+            yield Finding(case.at_recording(place, use), text, ACROSS_GAPS, remedy, "warning")
+
+
+def samples_are_not_repeated(case: Case) -> Iterator[Finding]:
+    """Values that a slower logger held until its next one are not new measurements; a held command is one."""
+    for where, channel, recorded in case.recorded():
+        count = repeats(recorded) if channel.role == "output" or channel.hold == "linear" else None
+        if count is not None:
+            held = (
+                "state `hold: zero` if it is a command that the drive holds, else " if channel.role == "input" else ""
+            )
+            remedy = f"{held}import it again with `held: {count}` in its map, or make the repeats NaN"
+            yield Finding(where, repeats_text(recorded, count), AS_NEW, remedy, "warning")
+
+
 PLAUSIBILITY: tuple[Rule, ...] = (
     stated_noise_is_seen,
     resolution_is_seen,
     sensors_of_one_motion_agree,
     samples_come_often_enough,
+    samples_have_no_gaps,
+    samples_are_not_repeated,
 )

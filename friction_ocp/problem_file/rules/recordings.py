@@ -19,6 +19,7 @@ from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
 from friction_ocp.recording.conditioning import FEWEST_SAMPLES
+from friction_ocp.recording.doubts import starts_over, turnover_text
 from friction_ocp.recording.recording import FloatArray
 
 
@@ -140,6 +141,15 @@ def _pooled(case: Case, channel: Channel) -> FloatArray:
     return np.concatenate(values) if values else np.empty(0)
 
 
+def angles_do_not_start_over(case: Case) -> Iterator[Finding]:
+    """No angle loses a full turn of its counter from one sample to the next."""
+    for where, channel, recorded in case.recorded():
+        found = starts_over(recorded) if channel.signal == "theta" else None
+        if found is not None:
+            remedy = "import it again with `wrap` in its map, which --inspect of the log tells, or unroll it"
+            yield Finding(where, turnover_text(recorded, found), "an angle goes on past a full turn", remedy)
+
+
 def current_and_motion_agree(case: Case) -> Iterator[Finding]:
     """The recorded power can be that of a body with friction: it would not be if a sign were wrong."""
     if len(case.drive.motors) != 1:
@@ -190,6 +200,7 @@ RECORDINGS: tuple[Rule, ...] = (
     recordings_have_the_channels,
     units_fit_signals,
     channels_are_not_clipped,
+    angles_do_not_start_over,
     motors_are_enabled,
     inputs_move,
     outputs_have_enough_samples,
