@@ -27,7 +27,7 @@ FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
 SHORTEST, LONGEST = 2, 50
 """Samples in a segment."""
-MOST_SEGMENTS, MOST_CUTS = 3000, 200
+MOST_SEGMENTS, MOST_CUTS = 1000, 200
 """In one recording, and intervals of doubtful torque that are cut out; more would cost time and tell no more."""
 QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
 """Shares of a segment at which what gathers within it is looked at."""
@@ -134,7 +134,7 @@ def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> 
     bare = Footing(density, numbers, None, model.noise, train, model.drive.input_names)
     longest = max(float(item.grid.time[-1] - item.grid.time[0]) for item in train)
     seconds = max(_segment_length(model, bare, first), longest / MOST_SEGMENTS)
-    inflated = np.sqrt(model.noise**2 + _within(model, bare, first, seconds))
+    inflated = np.sqrt(model.noise**2 + within(model, bare, first, seconds))
     return Footing(density, numbers, seconds, inflated, train, model.drive.input_names)
 
 
@@ -308,7 +308,7 @@ def _segment_length(model: Model, foot: Footing, item: Experiment) -> float:
     step = float(np.median(np.diff(item.grid.time)))
     lengths = np.unique(np.geomspace(SHORTEST, LONGEST, 12).round()) * step
     fitting = [
-        length for length in lengths if np.all(_within(model, foot, item, float(length)) <= WITHIN * model.noise**2)
+        length for length in lengths if np.all(within(model, foot, item, float(length)) <= WITHIN * model.noise**2)
     ]
     return float(max(fitting, default=lengths[0]))
 
@@ -322,8 +322,8 @@ def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray
     return np.tile(moves[int(np.argmin(np.abs(power - np.mean(power))))], (QUARTERS.size, 1))
 
 
-def _within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
-    """Return (outputs,) the mean variance that torque noise adds between the start and end of a segment."""
+def within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
+    """Return (outputs,) the mean variance that torque noise adds from a known start on, over some seconds."""
     mech = model.drive.mechanism
     numbers, motion = _leaf_numbers(model, foot, item.name), _typical_motion(model, foot, item)
     units = unit_covariances(model, numbers, seconds * QUARTERS, motion)

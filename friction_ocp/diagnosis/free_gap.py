@@ -9,9 +9,10 @@ import numpy as np
 
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.footing import within
 from friction_ocp.diagnosis.held_out import fitted_without, folds
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
-from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.score import FreeRun, simulate_recordings
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
@@ -31,6 +32,8 @@ class FreeErrors:
     """(blocks, channels) sum of squared errors over the squared floor."""
     count: FloatArray
     """(blocks, channels) samples."""
+    drift: FloatArray
+    """(channels,) mean square over the squared floor that torque noise alone may make of free runs."""
 
     def ratios(self, weight: FloatArray | None = None) -> FloatArray:
         """Return (channels,) mean square error over the squared floor, blocks weighted."""
@@ -44,6 +47,11 @@ class FreeErrors:
         spread = np.nanvar(measured, axis=0) / self.floors**2
         return bool(np.any(self.ratios() > np.maximum(spread, 1.0)))
 
+    @property
+    def drowned(self) -> bool:
+        """Whether they are no farther from the recordings than torque noise alone may take them."""
+        return self.excess() <= float(np.mean(self.drift))
+
     def excess(self, weight: FloatArray | None = None) -> float:
         """Return E, the mean over channels of max(0, rms^2 / floor^2 - 1)."""
         return float(np.mean(np.maximum(self.ratios(weight) - 1.0, 0.0)))
@@ -54,7 +62,8 @@ def free_errors(fitted: FittedModel, held_out: bool) -> FreeErrors:
     model = fitted.model
     if held_out and not model.validation:
         return left_out_errors(fitted)
-    return _errors(model, simulate_recordings(model, model.validation if held_out else model.train, fitted.theta))
+    items = model.validation if held_out else model.train
+    return _errors(fitted, simulate_recordings(model, items, fitted.theta))
 
 
 def left_out_errors(fitted: FittedModel) -> FreeErrors:
@@ -63,11 +72,11 @@ def left_out_errors(fitted: FittedModel) -> FreeErrors:
     for group in folds(fitted):
         theta = fitted_without(fitted, group)
         runs += simulate_recordings(fitted.model, tuple(items[k] for k in group), theta)
-    return _errors(fitted.model, tuple(runs))
+    return _errors(fitted, tuple(runs))
 
 
-def _errors(model: Model, runs: tuple[FreeRun, ...]) -> FreeErrors:
-    floors = model.noise
+def _errors(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FreeErrors:
+    model, floors = fitted.model, fitted.model.noise
     power: list[FloatArray] = []
     count: list[FloatArray] = []
     for run in runs:
@@ -76,7 +85,22 @@ def _errors(model: Model, runs: tuple[FreeRun, ...]) -> FreeErrors:
         edges = np.linspace(0, run.time.size, BLOCKS + 1).astype(int)[:-1]
         power.append(np.add.reduceat(np.where(seen, scaled, 0.0), edges, axis=0))
         count.append(np.add.reduceat(seen.astype(float), edges, axis=0))
-    return FreeErrors(runs, model.drive.output_names, floors, np.concatenate(power), np.concatenate(count))
+    drift = _drift(fitted, runs)
+    return FreeErrors(runs, model.drive.output_names, floors, np.concatenate(power), np.concatenate(count), drift)
+
+
+def _drift(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FloatArray:
+    """Return (channels,) the mean variance that torque noise adds to free runs, over the squared floors.
+
+    About a typical motion, where nothing but drag takes it away again; no more than the recordings vary.
+    """
+    model, foot, span = fitted.model, fitted.footing, horizon(fitted.model)
+    if not any(foot.density.values()):
+        return np.zeros(model.noise.size)
+    length = float(np.mean([run.time[-1] - run.time[0] for run in runs]))
+    added = within(model, foot, model.train[0], length if span is None else min(span, length))
+    spread = np.nanvar(np.concatenate([run.measured for run in runs]), axis=0)
+    return np.where(added < spread, added, spread) / model.noise**2
 
 
 @dataclass(frozen=True)
@@ -99,9 +123,14 @@ def shrink(before: FreeErrors, after: FreeErrors, seed: int) -> Shrink:
     return Shrink(_share(before.excess(), after.excess()), (float(low), float(high)), by_channel)
 
 
-def carries_over(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
+def comes_closer(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
     """Whether free runs come closer than before, at 95 %, or leave nothing but noise whose size is in doubt."""
     return after.excess() <= DOUBTED - 1.0 or shrink(before, after, seed).interval95[0] > 0.0
+
+
+def carries_over(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
+    """Whether free runs come closer than before, or as close as torque noise lets them, whatever the model."""
+    return after.drowned or comes_closer(before, after, seed)
 
 
 def _share(before: float, after: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import DOUBTED, Excess, excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, free_errors, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer, free_errors, shrink
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.drive.parts import Drive
@@ -133,16 +133,19 @@ class Standard:
         get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
         of them is left, they have to get worse for certain: runs that drift may do so by chance. For the same reason
         they have to get better for certain, and by most of what they show, where nothing is missing from sample to
-        sample and no slow torque either.
+        sample and no slow torque either. What torque noise alone may do to free runs does not speak against an
+        addition.
         """
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
         one_step = (self._beyond, innovations(fitted).beyond)
-        all_of_it = carries_over(before, after, seed) and after.excess() <= (1.0 - ALONE) * before.excess()
+        all_of_it = comes_closer(before, after, seed) and after.excess() <= (1.0 - ALONE) * before.excess()
         if not self.silent or one_step[0] > DOUBTED - 1.0 or all_of_it:
             pairs.append((before.excess(), after.excess()))
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
-        if before.lost:
+        if after.drowned:
+            told = most
+        elif before.lost:
             told = most or after.excess() <= before.excess()
         elif one_step[1] <= DOUBTED - 1.0:
             told = most and shrink(before, after, seed).interval95[1] >= 0.0

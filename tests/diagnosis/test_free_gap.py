@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import diagnosis_cases
 import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
@@ -13,6 +14,9 @@ from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import BLOCKS, FreeErrors, carries_over, free_errors, gap_map
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
+
+NOISY = 0.02
+"""Noise of a current, A."""
 
 
 def test_samples_that_a_delay_loses_are_left_out_of_the_map(tmp_path: Path) -> None:
@@ -32,11 +36,18 @@ def test_samples_that_a_delay_loses_are_left_out_of_the_map(tmp_path: Path) -> N
         assert np.isfinite(cell.before) and cell.before == pytest.approx(cell.after)
 
 
-def errors_of(power: float, seed: int) -> FreeErrors:
+def errors_of(power: float, seed: int, drift: float = 0.0) -> FreeErrors:
     """Return errors of one channel: in every block their mean square over that of noise, give or take chance."""
     samples = 200.0
     blocks = power * np.random.default_rng(seed).chisquare(samples, (BLOCKS, 1))
-    return FreeErrors((), ("position",), np.ones(1), blocks, np.full((BLOCKS, 1), samples))
+    return FreeErrors(
+        (),
+        ("position",),
+        np.ones(1),
+        blocks,
+        np.full((BLOCKS, 1), samples),
+        np.array([drift]),
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,6 +56,24 @@ def errors_of(power: float, seed: int) -> FreeErrors:
 def test_only_what_comes_closer_elsewhere_carries_over(before: float, after: float, carries: bool) -> None:
     """Not what leaves free runs as far off as they were or farther; where noise is left there is nothing to close."""
     assert carries_over(errors_of(before, 1), errors_of(after, 2), 0) is carries
+
+
+@pytest.mark.parametrize(("after", "carries"), [(20.0, True), (200.0, False)])
+def test_what_is_as_close_as_torque_noise_lets_it_carries_over(after: float, carries: bool) -> None:
+    assert carries_over(errors_of(9.0, 1, drift=50.0), errors_of(after, 2, drift=50.0), 0) is carries
+
+
+def test_free_runs_beside_a_noisy_current_are_no_farther_off_than_its_noise_may_take_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnosis_cases, "CURRENT_NOISE", NOISY)
+    plain = axis()
+    noisy = replace(plain.sensors[1], noise_std=NOISY)
+    path = write_case(tmp_path, replace(plain, sensors=(plain.sensors[0], noisy)))
+    errors = free_errors(fit_base(prepare(load_problem(path))), held_out=True)
+    assert errors.excess() > 1e4, "noise of the current is most of it"
+    assert errors.drowned
+    assert np.mean(errors.drift) < 100.0 * errors.excess(), "dry friction takes drift away at reversals"
 
 
 def test_recordings_left_out_are_simulated_with_parameters_of_the_others(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_a_run_is_lost_where_the_mean_would_be_nearer(error: float, lost: bool) 
     measured = np.sin(2.0 * np.pi * time)[:, None]
     run = FreeRun("a", time, measured, measured + error, np.zeros((400, 2)), {})
     power, count = np.array([[400.0 * (error / FLOOR) ** 2]]), np.array([[400.0]])
-    assert FreeErrors((run,), ("position",), np.array([FLOOR]), power, count).lost is lost
+    assert FreeErrors((run,), ("position",), np.array([FLOOR]), power, count, np.zeros(1)).lost is lost
 
 
 def seen(effect: str, component: str, gain: float) -> Screened:
@@ -43,11 +43,18 @@ def test_far_from_the_recordings_an_effect_is_tried_at_all_its_places() -> None:
     assert with_resembling(found[:2], found, astray=True) == found
 
 
-def drifting(power: float, beyond: float, seed: int) -> FittedModel:
+def drifting(power: float, beyond: float, seed: int, drift: float = 0.0) -> FittedModel:
     """Return a fit whose free runs drift, unevenly, and whose one-step predictions leave something beyond noise."""
     blocks = 100.0 * power * np.random.default_rng(seed).chisquare(1.0, (24, 1))
     run = FreeRun("a", np.arange(2.0), np.array([[-1e6], [1e6]]), np.zeros((2, 1)), np.zeros((2, 1)), {})
-    free = FreeErrors((run,), ("position",), np.ones(1), blocks, np.full((24, 1), 100.0))
+    free = FreeErrors(
+        (run,),
+        ("position",),
+        np.ones(1),
+        blocks,
+        np.full((24, 1), 100.0),
+        np.array([drift]),
+    )
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
     linear = SimpleNamespace(rows=SimpleNamespace(recording=np.zeros(1), static=()))
     return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear))
@@ -73,6 +80,19 @@ def looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_free_runs_that_drift_may_get_worse_by_chance(left: float, after: float, material: bool) -> None:
     """Where nothing is left from sample to sample, an addition counts unless free runs get worse for certain."""
     assert Standard(drifting(5.0, 0.7, 1)).is_material(drifting(after, left, 2)) is material
+
+
+@pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(
+    ("beyond", "left", "after", "material"),
+    [(0.7, 0.0, 500.0, True), (0.7, 0.6, 500.0, False)],
+)
+def test_what_torque_noise_does_to_free_runs_is_no_evidence_against(
+    beyond: float, left: float, after: float, material: bool
+) -> None:
+    """Against an addition: there the one-step predictions tell."""
+    before, then = drifting(5.0, beyond, 1, drift=1e3), drifting(after, left, 2, drift=1e3)
+    assert Standard(before).is_material(then) is material
 
 
 @pytest.mark.usefixtures("looked_at")
