@@ -27,7 +27,7 @@ FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
 SHORTEST, LONGEST = 2, 50
 """Samples in a segment."""
-MOST_SEGMENTS, MOST_CUTS = 1000, 200
+MOST_SEGMENTS, MOST_CUTS = 3000, 200
 """In one recording, and intervals of doubtful torque that are cut out; more would cost time and tell no more."""
 QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
 """Shares of a segment at which what gathers within it is looked at."""
