@@ -28,7 +28,8 @@ FOLDS = 4
 SHORTEST, LONGEST = 2, 50
 """Samples in a segment."""
 MOST_SEGMENTS, MOST_CUTS = 3000, 200
-"""In one recording, and intervals of doubtful torque that are cut out; more would cost time and tell no more."""
+"""In one recording, and intervals of doubtful torque that are cut out; more cost time. Fewer segments blur what torque
+noise gathers within each."""
 QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
 """Shares of a segment at which what gathers within it is looked at."""
 WITHIN = 0.01
@@ -97,8 +98,12 @@ class Footing:
 
 def cuts(item: Experiment, seconds: float | None) -> IntArray:
     """Return the first nodes of segments of about `seconds`, the last node behind them."""
-    duration = float(item.grid.time[-1] - item.grid.time[0])
-    return windows(item, None if seconds is None else max(seconds, duration / MOST_SEGMENTS))
+    return windows(item, None if seconds is None else max(seconds, _shortest(item)))
+
+
+def _shortest(item: Experiment) -> float:
+    """Return the length of segments, s, of which a recording has as many as it may have."""
+    return float(item.grid.time[-1] - item.grid.time[0]) / MOST_SEGMENTS
 
 
 def pieces(item: Experiment, count: int) -> list[Experiment]:
@@ -132,8 +137,7 @@ def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> 
     if is_held(model.problem.drive) and not any(density.values()):
         return Footing(density, numbers, None, model.noise, train, model.drive.input_names, loss)
     bare = Footing(density, numbers, None, model.noise, train, model.drive.input_names)
-    longest = max(float(item.grid.time[-1] - item.grid.time[0]) for item in train)
-    seconds = max(_segment_length(model, bare, first), longest / MOST_SEGMENTS)
+    seconds = max(_segment_length(model, bare, first), *map(_shortest, train))
     inflated = np.sqrt(model.noise**2 + within(model, bare, first, seconds))
     return Footing(density, numbers, seconds, inflated, train, model.drive.input_names)
 

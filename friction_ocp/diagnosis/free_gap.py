@@ -33,7 +33,7 @@ class FreeErrors:
     count: FloatArray
     """(blocks, channels) samples."""
     drift: FloatArray
-    """(channels,) mean square over the squared floor that torque noise alone may make of free runs."""
+    """(channels,) mean square over the squared floor that torque noise alone may make of free runs, however far."""
 
     def ratios(self, weight: FloatArray | None = None) -> FloatArray:
         """Return (channels,) mean square error over the squared floor, blocks weighted."""
@@ -43,14 +43,17 @@ class FreeErrors:
     @property
     def lost(self) -> bool:
         """Whether the simulation of some channel is farther from the recordings than their mean value is."""
-        measured = np.concatenate([run.measured for run in self.runs])
-        spread = np.nanvar(measured, axis=0) / self.floors**2
-        return bool(np.any(self.ratios() > np.maximum(spread, 1.0)))
+        return bool(np.any(self.ratios() > np.maximum(self._spread, 1.0)))
 
     @property
     def drowned(self) -> bool:
-        """Whether they are no farther from the recordings than torque noise alone may take them."""
-        return self.excess() <= float(np.mean(self.drift))
+        """Whether they are no farther from the recordings than torque noise alone may take them, or than these vary."""
+        return self.excess() <= float(np.mean(np.fmin(self.drift, self._spread)))
+
+    @property
+    def _spread(self) -> FloatArray:
+        """(channels,) variance of the recordings over the squared floor."""
+        return np.nanvar(np.concatenate([run.measured for run in self.runs]), axis=0) / self.floors**2
 
     def excess(self, weight: FloatArray | None = None) -> float:
         """Return E, the mean over channels of max(0, rms^2 / floor^2 - 1)."""
@@ -92,15 +95,13 @@ def _errors(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FreeErrors:
 def _drift(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FloatArray:
     """Return (channels,) the mean variance that torque noise adds to free runs, over the squared floors.
 
-    About a typical motion, where nothing but drag takes it away again; no more than the recordings vary.
+    About a typical motion, where nothing but drag takes it away again.
     """
     model, foot, span = fitted.model, fitted.footing, horizon(fitted.model)
     if not any(foot.density.values()):
         return np.zeros(model.noise.size)
     length = float(np.mean([run.time[-1] - run.time[0] for run in runs]))
-    added = within(model, foot, model.train[0], length if span is None else min(span, length))
-    spread = np.nanvar(np.concatenate([run.measured for run in runs]), axis=0)
-    return np.where(added < spread, added, spread) / model.noise**2
+    return within(model, foot, model.train[0], length if span is None else min(span, length)) / model.noise**2
 
 
 @dataclass(frozen=True)

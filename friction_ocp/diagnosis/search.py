@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.free_gap import carries_over, left_out_errors
+from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, left_out_errors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import NONE, Considered, places
@@ -222,6 +223,11 @@ class Search:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()
 
+    @cached_property
+    def _left_out(self) -> FreeErrors:
+        """Free runs of the base model where recordings took no part."""
+        return left_out_errors(self.bench.base)
+
     def _helps(self) -> bool:
         """Whether what was added leaves nothing, or takes a part and makes free runs of training recordings left out
         better.
@@ -234,7 +240,7 @@ class Search:
             return True
         if base.cost - current.cost < PART * (base.cost - 0.5 * samples(base)):
             return False
-        before, after = map(left_out_errors, (base, current))
+        before, after = self._left_out, left_out_errors(current)
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 
     def _falls_short(self) -> bool:
@@ -242,7 +248,7 @@ class Search:
 
         Small slow torques hide below the noise of samples and yet move the drive.
         """
-        before, after = map(left_out_errors, (self.bench.base, self.bench.current))
+        before, after = self._left_out, left_out_errors(self.bench.current)
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
@@ -260,7 +266,7 @@ class Search:
         found = crew.screened(keys)
         power = excess(current.linear.rows, blocks)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
-        gap = power.significant(level) or ((not accepted or meant.names) and significant(bench.slow, level))
+        gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen = with_resembling(chosen, found, current.astray)

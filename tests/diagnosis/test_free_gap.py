@@ -13,6 +13,7 @@ from diagnosis_cases import axis, write_case
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import BLOCKS, FreeErrors, carries_over, free_errors, gap_map
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.score import FreeRun
 from friction_ocp.problem_file.load import load_problem
 
 NOISY = 0.02
@@ -40,14 +41,8 @@ def errors_of(power: float, seed: int, drift: float = 0.0) -> FreeErrors:
     """Return errors of one channel: in every block their mean square over that of noise, give or take chance."""
     samples = 200.0
     blocks = power * np.random.default_rng(seed).chisquare(samples, (BLOCKS, 1))
-    return FreeErrors(
-        (),
-        ("position",),
-        np.ones(1),
-        blocks,
-        np.full((BLOCKS, 1), samples),
-        np.array([drift]),
-    )
+    run = FreeRun("a", np.arange(2.0), np.array([[-1e6], [1e6]]), np.zeros((2, 1)), np.zeros((2, 1)), {})
+    return FreeErrors((run,), ("position",), np.ones(1), blocks, np.full((BLOCKS, 1), samples), np.array([drift]))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out, told
+from friction_ocp.diagnosis.linear import _banded_factors
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
@@ -127,3 +128,16 @@ def test_what_breaks_down_on_recordings_left_out_is_not_free() -> None:
     costs = told(np.array([1.0, 3e7, np.nan, np.inf]))
     assert list(costs) == [1.0, 3e7, 3e7, 3e7]
     assert list(told(np.array([2.0, np.nan]))) == [2.0, 1e6] and list(told(np.array([2.0, 5.0]))) == [2.0, 5.0]
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+def test_where_the_simulation_breaks_down_nodes_are_no_numbers(odd: float) -> None:
+    diagonal, upper = np.tile(np.eye(2), (4, 1, 1)), np.zeros((3, 2, 2))
+    diagonal[1, 0, 1] = diagonal[1, 1, 0] = odd
+    assert np.isnan(_banded_factors(diagonal, upper)).any()
+
+
+def test_directions_that_nothing_holds_stay_where_they_are() -> None:
+    """Two states that are one: the factors are those of the matrix but for what it takes to have some."""
+    diagonal, upper = np.tile(np.ones((2, 2)), (3, 1, 1)), np.zeros((2, 2, 2))
+    assert np.isfinite(_banded_factors(diagonal, upper)).all()

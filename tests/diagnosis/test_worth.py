@@ -47,14 +47,7 @@ def drifting(power: float, beyond: float, seed: int, drift: float = 0.0) -> Fitt
     """Return a fit whose free runs drift, unevenly, and whose one-step predictions leave something beyond noise."""
     blocks = 100.0 * power * np.random.default_rng(seed).chisquare(1.0, (24, 1))
     run = FreeRun("a", np.arange(2.0), np.array([[-1e6], [1e6]]), np.zeros((2, 1)), np.zeros((2, 1)), {})
-    free = FreeErrors(
-        (run,),
-        ("position",),
-        np.ones(1),
-        blocks,
-        np.full((24, 1), 100.0),
-        np.array([drift]),
-    )
+    free = FreeErrors((run,), ("position",), np.ones(1), blocks, np.full((24, 1), 100.0), np.array([drift]))
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
     linear = SimpleNamespace(rows=SimpleNamespace(recording=np.zeros(1), static=()))
     return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear))

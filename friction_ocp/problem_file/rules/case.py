@@ -19,7 +19,8 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.expressions import resolve_ties
 from friction_ocp.parameters import Leaf, Tie, leaves, start_of
-from friction_ocp.recording.conditioning import smooth_motion
+from friction_ocp.recording.conditioning import FEWEST_SAMPLES, smooth_motion
+from friction_ocp.recording.counters import Turnover
 from friction_ocp.recording.doubts import starts_over
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
@@ -217,6 +218,16 @@ class Case:
             self._motions[key] = self._undo(channel, use)
         return self._motions[key]
 
+    def turnover(self, recorded: RecordedChannel) -> Turnover | None:
+        """Return the turn that recorded samples lose time and again, if they do."""
+        if id(recorded) not in self._turnovers:
+            self._turnovers[id(recorded)] = starts_over(recorded)
+        return self._turnovers[id(recorded)]
+
+    @cached_property
+    def _turnovers(self) -> dict[int, Turnover | None]:
+        return {}
+
     @cached_property
     def _motions(self) -> dict[tuple[str, int], Motion | None]:
         return {}
@@ -226,7 +237,7 @@ class Case:
         gain, offset = (self.numbers[f"{channel.name}.{key}"] for key in ("gain", "offset"))
         if recorded is None or not _is_usable(recorded) or not abs(gain) > 0:
             return None
-        if channel.signal == "theta" and starts_over(recorded):  # jumps are no motion, and told by a rule
+        if channel.signal == "theta" and self.turnover(recorded):  # jumps are no motion, and told by a rule
             return None
         with np.errstate(all="ignore"):  # absurd values come out as not finite
             value, slope, _ = smooth_motion(recorded.time, (recorded.values - offset) / gain)
@@ -238,7 +249,7 @@ class Case:
 def _is_usable(recorded: RecordedChannel) -> bool:
     if recorded.time.shape != recorded.values.shape or not np.all(np.diff(recorded.time) > 0):
         return False
-    return bool(np.count_nonzero(np.isfinite(recorded.values)) >= 5)
+    return bool(np.count_nonzero(np.isfinite(recorded.values)) >= FEWEST_SAMPLES)
 
 
 def quantity_text(value: float, unit: str) -> str:

@@ -19,7 +19,7 @@ from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
 from friction_ocp.recording.conditioning import FEWEST_SAMPLES
-from friction_ocp.recording.doubts import starts_over, turnover_text
+from friction_ocp.recording.doubts import turnover_text
 from friction_ocp.recording.recording import FloatArray
 
 
@@ -144,7 +144,7 @@ def _pooled(case: Case, channel: Channel) -> FloatArray:
 def angles_do_not_start_over(case: Case) -> Iterator[Finding]:
     """No angle loses a full turn of its counter from one sample to the next."""
     for where, channel, recorded in case.recorded():
-        found = starts_over(recorded) if channel.signal == "theta" else None
+        found = case.turnover(recorded) if channel.signal == "theta" else None
         if found is not None:
             remedy = "import it again with `wrap` in its map, which --inspect of the log tells, or unroll it"
             yield Finding(where, turnover_text(recorded, found), "an angle goes on past a full turn", remedy)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
@@ -19,26 +20,25 @@ _MUCH = 0.5
 def delays_are_shorter_than_recordings(case: Case) -> Iterator[Finding]:
     """Once delays and clocks are taken back, outputs are seen while inputs drive the machine."""
     told: set[str] = set()
-    for _, use in case.uses():
-        for output in case.drive.outputs:
-            for channel in (item for item in case.drive.inputs if is_driving(item)):
-                spans = _span(case, use, output), _span(case, use, channel)
-                if spans[0] is None or spans[1] is None:
-                    continue
-                length = min(spans[0][1] - spans[0][0], spans[1][1] - spans[1][0])
-                common = max(min(spans[0][1], spans[1][1]) - max(spans[0][0], spans[1][0]), 0.0)
-                shifts = {**_shifts(case, output), **_shifts(case, channel)}
-                path = max(shifts, key=lambda path: abs(shifts[path]), default="")
-                if common < (1.0 - _MUCH) * length and shifts.get(path) and path not in told:
-                    told.add(path)
-                    what = (
-                        f"{case.written(path)} leaves {_seconds(common)} of {_seconds(length)} in which both "
-                        f"'{output.name}' and '{channel.name}' are recorded in {use.name}"
-                    )
-                    remedy = "convert it if it is in ms, or correct its sign"
-                    severity = "error" if common == 0.0 else "warning"
-                    where = case.at(case.place(path))
-                    yield Finding(where, what, "a time in s, shorter than the recordings", remedy, severity)
+    driving = [channel for channel in case.drive.inputs if is_driving(channel)]
+    for (_, use), output, channel in product(case.uses(), case.drive.outputs, driving):
+        one, other = _span(case, use, output), _span(case, use, channel)
+        if one is None or other is None:
+            continue
+        length = min(one[1] - one[0], other[1] - other[0])
+        common = max(min(one[1], other[1]) - max(one[0], other[0]), 0.0)
+        shifts = {**_shifts(case, output), **_shifts(case, channel)}
+        path = max(shifts, key=lambda path: abs(shifts[path]), default="")
+        if common < (1.0 - _MUCH) * length and shifts.get(path) and path not in told:
+            told.add(path)
+            what = (
+                f"{case.written(path)} leaves {_seconds(common)} of {_seconds(length)} in which both "
+                f"'{output.name}' and '{channel.name}' are recorded in {use.name}"
+            )
+            remedy = "convert it if it is in ms, or correct its sign"
+            severity = "error" if common == 0.0 else "warning"
+            where = case.at(case.place(path))
+            yield Finding(where, what, "a time in s, shorter than the recordings", remedy, severity)
 
 
 def _span(case: Case, use: RecordingUse, channel: Channel) -> tuple[float, float] | None:
