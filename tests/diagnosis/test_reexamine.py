@@ -51,6 +51,7 @@ def round_of(bench: Bench, keys: list[Key]) -> Round:
     return Round((), choice, before, excess(before.linear.rows, bench.blocks), rivals[0])
 
 
+@pytest.mark.slow
 def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None:
     """A break accepted for quadratic drag goes when cogging is in beside it; what is right already stays."""
     plant = axis(law="quadratic", quadratic=1e-5)
@@ -121,7 +122,7 @@ def test_bristles_are_found_with_their_damping(tmp_path: Path) -> None:
     assert found.final.values["motor.friction.bristle.sigma1"] == pytest.approx(damping, rel=0.1)
 
 
-@pytest.mark.parametrize("first", ["constant_torque", "unbalance"])
+@pytest.mark.parametrize("first", ["constant_torque", pytest.param("unbalance", marks=pytest.mark.slow)])
 def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: Path) -> None:
     """Dry friction that differs by direction remains what a constant torque may be; gravity goes, accepted or not."""
     plant = axis(tau_c=(1.1 * COULOMB, 0.9 * COULOMB))

@@ -166,6 +166,7 @@ def test_the_sharpness_of_saturation_is_found(tmp_path: Path) -> None:
     assert found["saturation_sharpness"] == pytest.approx(sharpness, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_does_the_work_of_two_in_a_more_general_shape_takes_their_place(tmp_path: Path) -> None:
     """Unbalance explains a wave once a turn, and cogging one of its overtones: cogging with overtones is all of it."""
     result = diagnosed(tmp_path, cogging_once_a_turn(), ["unbalance", "cogging"])

@@ -18,7 +18,10 @@ from friction_ocp.problem_file.load import load_problem
 GRAVITY = 0.2
 
 
-@pytest.mark.parametrize(("factor", "accepted"), [(1.4, (("inertia_error", "motor"),)), (1.04, ())])
+@pytest.mark.parametrize(
+    ("factor", "accepted"),
+    [(1.4, (("inertia_error", "motor"),)), pytest.param(1.04, (), marks=pytest.mark.slow)],
+)
 def test_an_inertia_beyond_three_deviations_of_its_prior_is_named(
     factor: float, accepted: tuple[tuple[str, str], ...], tmp_path: Path
 ) -> None:
