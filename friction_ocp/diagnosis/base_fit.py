@@ -9,7 +9,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.polishing import COARSE, WARM, polished, timed
+from friction_ocp.diagnosis.polishing import COARSE, WARM, loosely_joined, polished, timed
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.fit import fit
@@ -17,9 +17,9 @@ from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions, relaxed
+from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions
 from friction_ocp.simulation.grid import FloatArray
-from friction_ocp.simulation.losses import Absolute, Squares
+from friction_ocp.simulation.losses import Absolute
 
 BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
@@ -98,6 +98,5 @@ def _rough_answer(model: Model) -> tuple[Program, Point]:
     short = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, short.suggested_nodes(model.space.guess))
     starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
-    program = relaxed(model, model.train, 0.0, Squares())
-    ends = [solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE) for theta in starts]
-    return program, min(ends, key=lambda end: end.objective).point
+    ends = [loosely_joined(model, theta) for theta in starts]
+    return min(ends, key=lambda end: end[0].objective(end[1]))

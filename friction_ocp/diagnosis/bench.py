@@ -18,8 +18,8 @@ from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
-from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun
-from friction_ocp.diagnosis.refit import nudged
+from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
+from friction_ocp.diagnosis.refit import NUDGES, nudged
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard
 from friction_ocp.drive.parts import Drive
@@ -42,8 +42,8 @@ from friction_ocp.statistics.workshop import Workshop
 
 Tell = Callable[[str, float], None]
 """Called with what is being done and the share of a round that is done."""
-NUDGES, MOST_TURNS = 2, 3
-"""Fits from parameters changed by chance at a time, and how often they may go on from a better one."""
+MOST_TURNS = 3
+"""How often fits from parameters changed by chance may go on from a better one."""
 LOSSES = (Absolute, Huber, Squares, StudentT)
 
 
@@ -108,6 +108,27 @@ class Bench:
         if not np.isfinite(program.objective(point)):
             return None
         return FittedModel(model, current.footing, linear_program(program, point))
+
+    @cached_property
+    @once
+    def loose(self) -> FittedModel | None:
+        """The current model on loosely joined segments: where predictions hold though free runs have gone astray.
+
+        None where the footing has segments, or the simulation breaks down.
+        """
+        current = self.current
+        if current.footing.segment_s is not None:
+            return None
+        program, point = loosely_joined(current.model, current.theta)
+        if not np.isfinite(program.objective(point)):
+            return None
+        return FittedModel(current.model, current.footing, linear_program(program, point))
+
+    @cached_property
+    def loose_blocks(self) -> Blocks:
+        """Blocks of the residuals of loosely joined segments."""
+        assert self.loose is not None
+        return blocks_of(self.loose.linear.rows)
 
     @cached_property
     def blocks(self) -> Blocks:

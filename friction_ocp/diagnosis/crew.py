@@ -13,7 +13,7 @@ from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_documen
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
-from friction_ocp.diagnosis.refit import begun_at_size, completed, quick_refit
+from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.worth import Key
@@ -62,6 +62,14 @@ class Crew:
         """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
         tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
         return self._tested("screening from the guesses", tasks, 0.25)
+
+    def screened_loosely(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+        """Return the score tests on loosely joined segments, largest predicted gain first; none where there are none.
+
+        Gains are in units of what such gaps allow: they compare with one another alone.
+        """
+        tasks = [self._task("loose", key, screen_loose, key) for key in candidates]
+        return self._tested("screening on loosely joined segments", tasks, 0.25)
 
     def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
         found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
@@ -151,6 +159,12 @@ def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
     return None if start is None else _tested(bench, start, bench.unfitted_blocks, effect, place)
 
 
+def screen_loose(bench: Bench, effect: str, place: str) -> Json:
+    """Test an effect at a place on loosely joined segments; null where there are none."""
+    start = bench.loose
+    return None if start is None else _tested(bench, start, bench.loose_blocks, effect, place)
+
+
 def _tested(bench: Bench, start: FittedModel, blocks: Blocks, effect: str, place: str) -> Json:
     seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
     return None if seen is None else screened_document(seen)
@@ -178,9 +192,15 @@ def _refitted(start: FittedModel, item: Screened) -> Json:
 
 
 def complete_candidate(bench: Bench, content: Json, point: Json, asked: float, thorough: bool) -> Json:
-    """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters."""
+    """Refit a candidate from there to its end, cost it on recordings left out, and see whether it matters.
+
+    Free runs that were lost before and are not now have come close to the recordings, not to the best end.
+    """
     seat = seat_candidate(bench, restored_screened(bench, content), point)
-    return _judged(bench, completed(seat, thorough), asked)
+    fitted = completed(seat, thorough)
+    if thorough and bench.current.lost and not fitted.astray:
+        fitted = best_nudged(fitted, bench.problem.estimation.seed)
+    return _judged(bench, fitted, asked)
 
 
 def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> Json:

@@ -63,6 +63,11 @@ class FittedModel:
         """Whether something so large is missing that the parameters that the fit has found say little."""
         return FAR < self.missed < np.inf
 
+    @property
+    def lost(self) -> bool:
+        """Whether it is free runs over whole recordings that have gone astray: they have many ends, most far off."""
+        return self.astray and self.footing.segment_s is None
+
     @cached_property
     @once
     def cost(self) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
@@ -13,7 +15,9 @@ from friction_ocp.estimation.model import Model, in_time
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.splicing import carried_on
+from friction_ocp.estimation.stages import relaxed
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
 QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=10)
@@ -60,6 +64,21 @@ def joined(program: Program, point: Point) -> Point:
             break
         point, cost = trial, after
     return point
+
+
+def loosely_joined(model: Model, theta: FloatArray) -> tuple[Program, Point]:
+    """Return segments joined by gaps that any error of the model may take, and the best parameters from a start.
+
+    Free runs over whole recordings have many ends, most of them far from the best; on loosely joined segments the way
+    is short, and leads near it.
+    """
+    program = relaxed(model, model.train, 0.0, Squares())
+    return program, solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE).point
+
+
+def loosely(model: Model, values: Mapping[str, float]) -> FloatArray:
+    """Return the parameters that are best on loosely joined segments, from some values."""
+    return loosely_joined(model, model.space.clip(model.space.with_known(values)))[1].theta
 
 
 def worthwhile(program: Program, cost: float) -> float:

@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds, held_out
-from friction_ocp.diagnosis.polishing import UNIMPORTANT, polished
+from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
@@ -190,11 +190,14 @@ def _others(bench: Bench, choice: Choice, accepted: Sequence[Key], seen: Collect
 def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:
     """Fit the base model with some additions, from where one of them ended by itself and what the others are now.
 
-    Or from where all but that one are now, if that is nearer.
+    Or from where all but that one are now, if that is nearer, or from where loosely joined segments lead free runs.
     """
     model = with_drive(bench.base.model, _drive(bench, keys))
     starts = [{**current.values, **alone}, {**alone, **current.values}]
-    ends = [polished(model, bench.base.footing, model.space.with_known(known), None) for known in starts]
+    begins = [model.space.with_known(known) for known in starts]
+    if bench.base.footing.segment_s is None:
+        begins.append(loosely(model, starts[0]))
+    ends = [polished(model, bench.base.footing, theta, None) for theta in begins]
     best = min(ends, key=lambda end: end.objective)
     return best if best.astray and not current.astray else completed(best)
 

@@ -10,7 +10,7 @@ from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.easing import eased
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
-from friction_ocp.diagnosis.polishing import QUICK, polished, timed
+from friction_ocp.diagnosis.polishing import QUICK, loosely, polished, timed
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import Model, with_drive
@@ -20,9 +20,9 @@ SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
 MOST_OF = 0.5
 """Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
-NUDGE, CLOSE_BY = 0.05, 1.2
-"""Relative change of the parameters from which a fit begins again, and its objective after a few steps over the known
-one up to which it goes on."""
+NUDGES, NUDGE, CLOSE_BY = 2, 0.05, 1.2
+"""Fits that begin again at a time, the relative change of the parameters from which they do, and their objective after
+a few steps over the known one up to which they go on."""
 
 
 def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
@@ -30,7 +30,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
 
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
-    where most of that stays, steps begin at a large effect, too.
+    where most of that stays, steps begin at a large effect, too. Of free runs that miss much steps begin where loosely
+    joined segments lead, too.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -42,6 +43,9 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
         far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]
+    if base.lost:
+        values = item.starts[0].values(item.augmentation.off, base.values, 1.0)
+        ends.append(timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK))
     large, best = item.augmentation.large, min(end.objective for end in ends)
     if base.astray and large is not None and base.objective - best < MOST_OF * base.objective:
         tried = [large(start.added(item.augmentation.off)) for start in item.starts]
@@ -98,14 +102,20 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     """Fit again from parameters that chance has changed a little.
 
     Exact friction has kinks, and between them many ends: an answer that is not the best one leaves a torque that no
-    effect explains.
+    effect explains. Free runs of steps cut short tell no more than whether they have gone astray.
     """
     rng = np.random.default_rng(seed)
     theta = fitted.theta * (1.0 + NUDGE * rng.standard_normal(fitted.theta.size))
     end = polished(fitted.model, fitted.footing, theta, None, QUICK)
-    if not end.objective < CLOSE_BY * fitted.objective:
+    near = end.objective < CLOSE_BY * fitted.objective
+    if not near and (end.astray or end.footing.segment_s is not None):
         return end
     return freed(polished(end.model, end.footing, end.theta, end.linear.point.nodes))
+
+
+def best_nudged(fitted: FittedModel, seed: int) -> FittedModel:
+    """Return the best of a fit and of those from beside it."""
+    return min([fitted, *(nudged(fitted, seed + k) for k in range(NUDGES))], key=lambda end: end.objective)
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:

@@ -45,7 +45,8 @@ all whose objective is within this factor; and what resembles the best. As many 
 leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
-has moved far to stand in for what is missing hide what it is."""
+has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of free runs
+that are lost, and for those of loosely joined segments beside them."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
 MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
@@ -251,6 +252,17 @@ class Search:
         before, after = self._left_out, left_out_errors(self.bench.current)
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
+    def _nearly(self, known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
+        """Return what might have been in the place of the last addition: what it promises beside that says little.
+
+        Only where another shape took it, since that can do a part of another effect's work.
+        """
+        last = self.rounds[-1] if self.rounds else None
+        if not chosen or last is None or last.accepted is None or _count(self.rounds, last.accepted.key) < 2:
+            return []
+        keys, taken = [item.key for item in last.choice.aliases], {item.key for item in chosen}
+        return [known[key] for key in keys if key in known and key not in taken and known[key].starts]
+
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
         """Decide on an addition to the model of a bench, or on a more general shape of what it has.
 
@@ -269,8 +281,14 @@ class Search:
         gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-        chosen = with_resembling(chosen, found, current.astray)
-        unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
+        chosen += self._nearly(known, chosen)
+        unfitted = list[Screened]()
+        if chosen and current.lost:
+            chosen = _beginning_at(_promising(chosen), _promising(crew.screened_loosely(list(known))))
+            chosen = with_resembling(chosen, found)
+        else:
+            chosen = with_resembling(chosen, found, current.astray)
+            unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         asked = {key: -np.inf if key in again else enough for key in known}
@@ -287,8 +305,22 @@ class Search:
 
 
 def _promising(found: Sequence[Screened]) -> list[Screened]:
-    """Return the few candidates that promise most where all parameters are at their guesses."""
+    """Return the few candidates that promise most."""
     return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
+
+
+def _count(rounds: Sequence[Round], key: Key) -> int:
+    return sum(item.accepted is not None and item.accepted.key == key for item in rounds)
+
+
+def _beginning_at(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
+    """Return chosen candidates and others; of those that are among both the refit begins where either predicts."""
+    also = {item.key: item for item in others}
+    both = [
+        replace(item, starts=(*also.pop(item.key).starts[:1], *item.starts)) if item.key in also else item
+        for item in chosen
+    ]
+    return [*both, *also.values()]
 
 
 def completed_rivals(
