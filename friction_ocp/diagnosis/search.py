@@ -252,7 +252,7 @@ class Search:
         before, after = self._left_out, left_out_errors(self.bench.current)
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
-    def _nearly(self, known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
+    def nearly(self, known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
         """Return what might have been in the place of the last addition: what it promises beside that says little.
 
         Only where another shape took it, since that can do a part of another effect's work.
@@ -281,10 +281,10 @@ class Search:
         gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-        chosen += self._nearly(known, chosen)
+        chosen += self.nearly(known, chosen)
         unfitted = list[Screened]()
         if chosen and current.lost:
-            chosen = _beginning_at(_promising(chosen), _promising(crew.screened_loosely(list(known))))
+            chosen = beginning_at(_promising(chosen), _promising(crew.screened_loosely(list(known))))
             chosen = with_resembling(chosen, found)
         else:
             chosen = with_resembling(chosen, found, current.astray)
@@ -313,7 +313,7 @@ def _count(rounds: Sequence[Round], key: Key) -> int:
     return sum(item.accepted is not None and item.accepted.key == key for item in rounds)
 
 
-def _beginning_at(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
+def beginning_at(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
     """Return chosen candidates and others; of those that are among both the refit begins where either predicts."""
     also = {item.key: item for item in others}
     both = [

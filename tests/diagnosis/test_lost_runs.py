@@ -1,0 +1,139 @@
+"""Free runs that have gone astray: loosely joined segments tell what is missing, and lead refits near it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+import yaml
+from diagnosis_cases import ENCODER_STEP, STEP, axis, write_case
+from plant import PlantController, Trajectory, reversing_steps
+
+from friction_ocp.diagnosis import refit
+from friction_ocp.diagnosis.bench import Bench, open_bench
+from friction_ocp.diagnosis.crew import Crew
+from friction_ocp.diagnosis.polishing import loosely
+from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
+from friction_ocp.diagnosis.screen import Screened, Start
+from friction_ocp.diagnosis.search import Search, beginning_at
+from friction_ocp.effects.effect import Augmentation, Trial
+from friction_ocp.estimation.model import Model
+from friction_ocp.execution.executor import InProcess
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.statistics.execution import Execution
+
+HERE = Execution(InProcess())
+SECONDS, GAIN, UNBALANCE = 4.0, 0.4, 0.25
+"""s, N m/rad, N m: the unbalance pulls the arm over as the reference turns it round."""
+NAMES = (("unbalance", "motor"), ("stribeck", "motor"), ("quadratic_drag", "motor"), ("asymmetry", "motor"))
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """Return the bench of a servo whose model lacks a large unbalance."""
+    folder = tmp_path_factory.mktemp("lost")
+    plain = axis()
+    plant = replace(
+        plain,
+        shafts=(replace(plain.shafts[0], gravity=(UNBALANCE, 0.4)),),
+        motors=(replace(plain.motors[0], drive="torque", controller="loop"),),
+        controllers=(PlantController("loop", "p", "position", kp=GAIN, sample_time=STEP),),
+        sensors=plain.sensors[:1],
+    )
+    path = write_case(folder, plain)
+    time = STEP * np.arange(round(SECONDS / STEP) + 2)
+    for k, name in enumerate("abc"):
+        rng = np.random.default_rng(k)
+        steps = reversing_steps(np.array([0.5, 2.0, 5.0]), (0.3, 0.8), SECONDS, rng)
+        wanted = np.interp(time, np.asarray(steps.time), np.asarray(steps.value))
+        run = plant.simulate(SECONDS, {"reference.theta": Trajectory(time, wanted, "zero")}, rng)
+        channels = {"position": Channel("position", *run.channels["position"], "rad")}
+        seen = channels["position"].time
+        channels["wanted"] = Channel("wanted", seen, wanted[: seen.size], "rad")
+        write_recording(Recording(name, channels), folder / f"{name}.h5")
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["controller"] = {"type": "p", "feedback": "position", "kp": GAIN, "output": "torque", "sample_time": STEP}
+    document["channels"] = {
+        "wanted": {"measures": "reference.theta", "role": "input", "hold": "zero"},
+        "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
+    }
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return open_bench(load_problem(path), HERE)
+
+
+def crew_of(bench: Bench) -> Crew:
+    return Crew(bench, HERE, 1, lambda what, share: None)
+
+
+def test_loosely_joined_segments_tell_what_lost_free_runs_lack(bench: Bench) -> None:
+    """The effect that is missing comes first, its size near the truth, wherever the free run has ended."""
+    assert bench.current.lost and bench.loose is not None
+    first, *others = crew_of(bench).screened_loosely(NAMES)
+    assert first.key == ("unbalance", "motor") and first.gain > 2.0 * others[0].gain
+    assert first.values["motor.gravity.torque"] == pytest.approx(UNBALANCE, rel=0.3)
+
+
+def test_a_refit_of_lost_runs_begins_where_loosely_joined_segments_lead(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a tenth of the size and the wrong way round; what is beside the end is no better than what is returned."""
+    begun = list[dict[str, float]]()
+
+    def spied(model: Model, values: Mapping[str, float]) -> FloatArray:
+        begun.append(dict(values))
+        return loosely(model, values)
+
+    monkeypatch.setattr(refit, "loosely", spied)
+    (item,) = crew_of(bench).screened_loosely(NAMES[:1])
+    known = item.starts[0]
+    start = replace(known, sizes=tuple(-0.1 * size for size in known.sizes), shift=dict.fromkeys(known.shift, 0.0))
+    found = completed(quick_refit(bench.current, replace(item, starts=(start,))))
+    wrong = -0.1 * item.values["motor.gravity.torque"]
+    assert [values["motor.gravity.torque"] for values in begun] == [pytest.approx(wrong)]
+    assert not found.astray
+    assert found.values["motor.gravity.torque"] == pytest.approx(UNBALANCE, rel=0.05)
+    best = best_nudged(found, 0)
+    assert best.objective == min(found.objective, *(nudged(found, k).objective for k in range(NUDGES)))
+
+
+def test_the_segments_of_a_footing_need_no_looser_ones(tmp_path: Path) -> None:
+    """Where gaps are as wide as noise makes them predictions hold already."""
+    bench = open_bench(load_problem(write_case(tmp_path, axis())), HERE)
+    assert bench.loose is None and not bench.current.lost
+    assert crew_of(bench).screened_loosely(NAMES) == []
+
+
+def candidate(effect: str, *sizes: float) -> Screened:
+    starts = tuple(Start(Trial(({"size": 1.0},)), (size,), {}) for size in sizes)
+    return Screened(effect, "motor", 1.0, 0.0, starts, Augmentation(cast(Any, None), {"size": 0.0}, ()))
+
+
+def test_a_refit_begins_where_either_prediction_says() -> None:
+    """What both ask for begins at both sizes, the looser one's first; what one asks for is tried as well."""
+    both = beginning_at(
+        [candidate("stribeck", 1.0), candidate("cogging", 2.0)], [candidate("cogging", 3.0, 4.0), candidate("lag", 5.0)]
+    )
+    sizes = {item.effect: [start.sizes[0] for start in item.starts] for item in both}
+    assert sizes == {"stribeck": [1.0], "cogging": [3.0, 2.0], "lag": [5.0]}
+
+
+@pytest.mark.parametrize("reshaped", [True, False])
+def test_what_a_shape_displaced_is_tried_again(reshaped: bool) -> None:
+    """Overtones take the place of what was as likely; an effect of its own does not bring its rivals back."""
+    stiffening, ripple = candidate("stiffening", 1.0), candidate("torque_ripple", 1.0)
+    done = [ripple] * 2 if reshaped else [candidate("cogging", 1.0), ripple]
+    rounds = [
+        SimpleNamespace(accepted=SimpleNamespace(key=item.key), choice=SimpleNamespace(aliases=(ripple, stiffening)))
+        for item in done
+    ]
+    chosen, known = [candidate("backlash", 1.0)], {stiffening.key: stiffening}
+    again = Search.nearly(cast(Any, SimpleNamespace(rounds=rounds)), known, chosen)
+    assert again == ([stiffening] if reshaped else [])
