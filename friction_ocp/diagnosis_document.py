@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.options import AT, considered
 from friction_ocp.diagnosis.reading import corrections, with_additions
 from friction_ocp.diagnosis.rival import Rival
-from friction_ocp.diagnosis.select import probabilities
+from friction_ocp.diagnosis.select import gave_shape, probabilities
 from friction_ocp.diagnosis.worth import samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
@@ -144,11 +144,7 @@ def _curve(found: Shape, drive: Drive) -> dict[str, Any]:
 
 
 def _rounds(diagnosis: Diagnosis, rounds: Sequence[Round]) -> list[dict[str, Any]]:
-    earlier, found = set[Key](), list[dict[str, Any]]()
-    for item in rounds:
-        found.append(_round(diagnosis, item, item.accepted is not None and item.accepted.key in earlier))
-        earlier |= set() if item.accepted is None else {item.accepted.key}
-    return found
+    return [_round(diagnosis, item, gave_shape(rounds, k)) for k, item in enumerate(rounds)]
 
 
 def _round(diagnosis: Diagnosis, item: Round, reshaped: bool) -> dict[str, Any]:

@@ -98,5 +98,4 @@ def _rough_answer(model: Model) -> tuple[Program, Point]:
     short = predictions(model, model.train, WIDTHS[0])
     start = Point(model.space.guess, short.suggested_nodes(model.space.guess))
     starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
-    ends = [loosely_joined(model, theta) for theta in starts]
-    return min(ends, key=lambda end: end[0].objective(end[1]))
+    return loosely_joined(model, starts)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
@@ -119,27 +119,10 @@ class Bench:
         current = self.current
         if current.footing.segment_s is not None:
             return None
-        program, point = loosely_joined(current.model, current.theta)
+        program, point = loosely_joined(current.model, [current.theta])
         if not np.isfinite(program.objective(point)):
             return None
         return FittedModel(current.model, current.footing, linear_program(program, point))
-
-    @cached_property
-    def loose_blocks(self) -> Blocks:
-        """Blocks of the residuals of loosely joined segments."""
-        assert self.loose is not None
-        return blocks_of(self.loose.linear.rows)
-
-    @cached_property
-    def blocks(self) -> Blocks:
-        """Blocks of the residuals of the current model."""
-        return blocks_of(self.current.linear.rows)
-
-    @cached_property
-    def unfitted_blocks(self) -> Blocks:
-        """Blocks of the residuals at the guesses."""
-        assert self.unfitted is not None
-        return blocks_of(self.unfitted.linear.rows)
 
     @cached_property
     @once

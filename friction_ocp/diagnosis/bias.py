@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import drive_leaves
@@ -49,8 +48,7 @@ def biased_parameters(base: FittedModel, final: FittedModel) -> tuple[Bias, ...]
 def standard_errors(fitted: FittedModel) -> FloatArray:
     """Return the standard errors of all parameters, robust against residuals that are correlated within blocks."""
     rows = fitted.linear.rows
-    blocks = blocks_of(rows)
-    scores = blocks.sums(rows.jacobian * rows.residual[:, None])
+    scores = fitted.blocks.sums(rows.jacobian * rows.residual[:, None])
     hessian = rows.jacobian.T @ rows.jacobian
     inverse = np.linalg.pinv(hessian, rcond=1e-14)
     count = len(scores)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
-from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, quick_refit
@@ -150,29 +149,29 @@ class Crew:
 
 def screen_candidate(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place; null where the drive with it cannot be simulated."""
-    return _tested(bench, bench.current, bench.blocks, effect, place)
+    return _tested(bench, bench.current, effect, place)
 
 
 def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place with all parameters at their guesses; null where that cannot be simulated."""
-    start = bench.unfitted
-    return None if start is None else _tested(bench, start, bench.unfitted_blocks, effect, place)
+    return _tested(bench, bench.unfitted, effect, place)
 
 
 def screen_loose(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place on loosely joined segments; null where there are none."""
-    start = bench.loose
-    return None if start is None else _tested(bench, start, bench.loose_blocks, effect, place)
+    return _tested(bench, bench.loose, effect, place)
 
 
-def _tested(bench: Bench, start: FittedModel, blocks: Blocks, effect: str, place: str) -> Json:
-    seen = screen(start.model, start.linear, blocks, effects()[effect], place, bench.clues)
+def _tested(bench: Bench, start: FittedModel | None, effect: str, place: str) -> Json:
+    if start is None:
+        return None
+    seen = screen(start, effects()[effect], place, bench.clues)
     return None if seen is None else screened_document(seen)
 
 
 def held_out_costs(bench: Bench) -> Json:
     """Return (blocks,) costs of the current model on recordings left out."""
-    return plain(bench.blocks.sums(held_out(bench.current)))
+    return plain(bench.current.blocks.sums(held_out(bench.current)))
 
 
 def refit_candidate(bench: Bench, content: Json) -> Json:
@@ -211,7 +210,8 @@ def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> 
 
 def _judged(bench: Bench, fitted: FittedModel, asked: float) -> Json:
     enough = not bench.current.cost - fitted.cost < asked
-    costs = blocks_like(bench.current, fitted, bench.blocks) if enough else np.full(bench.blocks.count, np.nan)
+    blocks = bench.current.blocks
+    costs = blocks_like(bench.current, fitted, blocks) if enough else np.full(blocks.count, np.nan)
     standing = Standing.of(fitted, enough and bench.standard.is_material(fitted))
     return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
 

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.easing import FAR, missed
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import LinearProgram
@@ -67,6 +68,11 @@ class FittedModel:
     def lost(self) -> bool:
         """Whether it is free runs over whole recordings that have gone astray: they have many ends, most far off."""
         return self.astray and self.footing.segment_s is None
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """Blocks of the residuals."""
+        return blocks_of(self.linear.rows)
 
     @cached_property
     @once

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -66,19 +66,20 @@ def joined(program: Program, point: Point) -> Point:
     return point
 
 
-def loosely_joined(model: Model, theta: FloatArray) -> tuple[Program, Point]:
-    """Return segments joined by gaps that any error of the model may take, and the best parameters from a start.
+def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program, Point]:
+    """Return segments joined by gaps that any error of the model may take, and the best point from some parameters.
 
     Free runs over whole recordings have many ends, most of them far from the best; on loosely joined segments the way
     is short, and leads near it.
     """
     program = relaxed(model, model.train, 0.0, Squares())
-    return program, solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE).point
+    ends = [solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE) for theta in starts]
+    return program, min(ends, key=lambda end: end.objective).point
 
 
 def loosely(model: Model, values: Mapping[str, float]) -> FloatArray:
     """Return the parameters that are best on loosely joined segments, from some values."""
-    return loosely_joined(model, model.space.clip(model.space.with_known(values)))[1].theta
+    return loosely_joined(model, [model.space.clip(model.space.with_known(values))])[1].theta
 
 
 def worthwhile(program: Program, cost: float) -> float:

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
-from friction_ocp.diagnosis.blocks import Blocks, blocks_of
+from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds, held_out
@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Choice, Round, choose, resamples, schwarz, turned
+from friction_ocp.diagnosis.select import Choice, Round, choose, gave_shape, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import Key, may_grow, required
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import with_drive
@@ -123,8 +123,7 @@ def _is_open(rounds: Sequence[Round], index: int, accepted: Sequence[Key]) -> bo
     held = rounds[index].accepted
     if held is None or held.key not in accepted:
         return False
-    earlier = any(item.accepted is not None and item.accepted.key == held.key for item in rounds[:index])
-    return accepted.count(held.key) == 1 or not earlier
+    return accepted.count(held.key) == 1 or not gave_shape(rounds, index)
 
 
 def _swapped(accepted: Sequence[Key], held: Key, rival: Key) -> list[Key]:
@@ -242,10 +241,10 @@ class _Benchmark:
 
     fitted: FittedModel
 
-    @cached_property
+    @property
     def blocks(self) -> Blocks:
         """Blocks of its residuals."""
-        return blocks_of(self.fitted.linear.rows)
+        return self.fitted.blocks
 
     @cached_property
     def _costs(self) -> FloatArray:

@@ -9,12 +9,11 @@ import numpy as np
 
 from friction_ocp.diagnosis.blocks import Blocks, Score, score
 from friction_ocp.diagnosis.contrast import Contrast, contrast
-from friction_ocp.diagnosis.linear import LinearProgram
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.estimation.model import Model
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
@@ -71,16 +70,14 @@ class Screened:
         return bool(others) and others < own
 
 
-def screen(
-    model: Model, base: LinearProgram, blocks: Blocks, effect: AbstractEffect, place: str, clues: Clues
-) -> Screened | None:
+def screen(base: FittedModel, effect: AbstractEffect, place: str, clues: Clues) -> Screened | None:
     """Test an effect at a place; None where the drive with it cannot be simulated."""
     try:
-        augmentation = effect.addition(model.problem.drive, place, clues)
-        built = contrast(model, base, augmentation.drive)
+        augmentation = effect.addition(base.model.problem.drive, place, clues)
+        built = contrast(base.model, base.linear, augmentation.drive)
     except FrictionOcpError:
         return None
-    found = [_tried(built, blocks, augmentation, trial) for trial in augmentation.trials]
+    found = [_tried(built, base.blocks, augmentation, trial) for trial in augmentation.trials]
     order = sorted(range(len(found)), key=lambda k: -found[k].gain)
     best, chosen = found[order[0]], list[int]()
     for k in order:

@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
+from friction_ocp.diagnosis.select import Round, choose, gave_shape, shown, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.worth import (
     Key,
@@ -252,17 +252,6 @@ class Search:
         before, after = self._left_out, left_out_errors(self.bench.current)
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
-    def nearly(self, known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
-        """Return what might have been in the place of the last addition: what it promises beside that says little.
-
-        Only where another shape took it, since that can do a part of another effect's work.
-        """
-        last = self.rounds[-1] if self.rounds else None
-        if not chosen or last is None or last.accepted is None or _count(self.rounds, last.accepted.key) < 2:
-            return []
-        keys, taken = [item.key for item in last.choice.aliases], {item.key for item in chosen}
-        return [known[key] for key in keys if key in known and key not in taken and known[key].starts]
-
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
         """Decide on an addition to the model of a bench, or on a more general shape of what it has.
 
@@ -271,7 +260,7 @@ class Search:
         self._begun += 1
         number = self._begun
         crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share))
-        current, blocks, level = bench.current, bench.blocks, self.level
+        current, blocks, level = bench.current, bench.current.blocks, self.level
         enough = required(bench.base, current) if meant.names else np.inf
         again = shapes(current, bench.clues, accepted)
         keys = [*places(current, meant), *again]
@@ -281,7 +270,7 @@ class Search:
         gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
-        chosen += self.nearly(known, chosen)
+        chosen += displaced(self.rounds, known, chosen)
         unfitted = list[Screened]()
         if chosen and current.lost:
             chosen = beginning_at(_promising(chosen), _promising(crew.screened_loosely(list(known))))
@@ -309,8 +298,15 @@ def _promising(found: Sequence[Screened]) -> list[Screened]:
     return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
 
 
-def _count(rounds: Sequence[Round], key: Key) -> int:
-    return sum(item.accepted is not None and item.accepted.key == key for item in rounds)
+def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
+    """Return what might have been in the place of the last addition: what it promises beside that says little.
+
+    Only where another shape took it, since that can do a part of another effect's work.
+    """
+    if not chosen or not rounds or not gave_shape(rounds, -1):
+        return []
+    keys, taken = [item.key for item in rounds[-1].choice.aliases], {item.key for item in chosen}
+    return [known[key] for key in keys if key in known and key not in taken and known[key].starts]
 
 
 def beginning_at(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:

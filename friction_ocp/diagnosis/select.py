@@ -116,6 +116,12 @@ def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:
     )
 
 
+def gave_shape(rounds: Sequence[Round], index: int) -> bool:
+    """Whether a round gave an effect that an earlier one had added a more general shape."""
+    held = rounds[index].accepted
+    return held is not None and any(item.accepted and item.accepted.key == held.key for item in rounds[:index])
+
+
 def withdrawn(item: Round) -> Round:
     """Return a round with its addition taken back: its rivals explain too little to take part."""
     return replace(item, choice=with_refused(NOTHING, item.choice.rivals), accepted=None)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.bench import blocks_like
-from friction_ocp.diagnosis.blocks import Blocks, blocks_of, stats
+from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
@@ -119,10 +119,10 @@ def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Consi
     It is a part whose fitted values are far from what is stated for them, or one whose values are fixed: fitted ones
     may have given way to it. Every value that is taken back costs what Schwarz 1978 asks for.
     """
-    blocks = blocks_of(current.linear.rows)
+    blocks = current.blocks
     each, without = schwarz(blocks), blocks.sums(held_out(current))
     best = dict[Key, tuple[float, Rival]]()
-    for count, seen, fitted in [*_released(current, found), *_freed(current, blocks, found, meant)]:
+    for count, seen, fitted in [*_released(current, found), *_freed(current, found, meant)]:
         gains = without - blocks_like(current, fitted, blocks)
         score = fitted.cost + count * each
         if seen.key not in best or score < best[seen.key][0]:
@@ -146,7 +146,7 @@ def _released(current: FittedModel, found: Sequence[Contradiction]) -> Iterator[
 
 
 def _freed(
-    current: FittedModel, blocks: Blocks, found: Sequence[Contradiction], meant: Considered
+    current: FittedModel, found: Sequence[Contradiction], meant: Considered
 ) -> Iterator[tuple[int, Screened, FittedModel]]:
     """Yield fits with the fixed values of a part made free, part by part.
 
@@ -159,7 +159,7 @@ def _freed(
     for effect, place in meant.candidates(model.problem.drive):
         if effect not in STATED:
             continue
-        seen = screen(model, current.linear, blocks, effects()[effect], place, clues)
+        seen = screen(current, effects()[effect], place, clues)
         if seen is None or not seen.starts:
             continue
         near = quick_refit(current, seen)

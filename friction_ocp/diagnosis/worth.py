@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.excess import DOUBTED, Excess, excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer, free_errors, shrink
@@ -158,8 +157,7 @@ class Standard:
 
 def innovations(fitted: FittedModel) -> Excess:
     """Return the power of the innovations over the noise."""
-    rows = fitted.linear.rows
-    return excess(rows, blocks_of(rows))
+    return excess(fitted.linear.rows, fitted.blocks)
 
 
 def _static_excess(fitted: FittedModel) -> float:

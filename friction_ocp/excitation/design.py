@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.refit import completed, quick_refit
@@ -78,8 +77,8 @@ def design(
     base = fit_base(prepare_fit(problem))
     if not between:
         return sharpening(base, criterion, tell)
-    clues, blocks = clues_of(base), blocks_of(base.linear.rows)
-    seen = {key: screen(base.model, base.linear, blocks, entries[key], key[1], clues) for key in dict.fromkeys(between)}
+    clues = clues_of(base)
+    seen = {key: screen(base, entries[key], key[1], clues) for key in dict.fromkeys(between)}
     rivals = [completed(quick_refit(base, item)) for item in _begun(seen)]
     return replace(separating(base, rivals, tell), between=tuple(between))
 

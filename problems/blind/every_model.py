@@ -12,7 +12,6 @@ import numpy as np
 from blind.judging import Pair
 from friction_ocp import FrictionOcpError, Problem
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
@@ -28,10 +27,10 @@ FITTED = 12
 def answer(problem: Problem) -> Pair | None:
     """Return the effect and place of the model with the lowest left-out error; None where it is the base model."""
     base = fit_base(prepare(problem))
-    blocks, clues = blocks_of(base.linear.rows), clues_of(base)
+    clues = clues_of(base)
     costs: dict[Pair | None, float] = {None: float(np.sum(held_out(base)))}
     entries = candidates(problem.drive, problem.diagnosis.get("effects") or list(effects()))
-    found = [screen(base.model, base.linear, blocks, effect, place, clues) for effect, place in entries]
+    found = [screen(base, effect, place, clues) for effect, place in entries]
     promising = sorted((item for item in found if item is not None), key=lambda item: -item.gain)[:FITTED]
     for item in promising:
         costs[item.key] = _left_out(base, item)

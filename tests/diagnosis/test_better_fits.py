@@ -85,7 +85,7 @@ def test_a_refit_that_came_to_rest_on_the_way_begins_at_other_sizes(tmp_path: Pa
     at = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
     resting = FittedModel(model, bench.current.footing, linear_program(program, at))
     without = restored(held_out_costs(bench))
-    known = Rival.of(item, resting, np.zeros(bench.blocks.count))
+    known = Rival.of(item, resting, np.zeros(bench.current.blocks.count))
     (better,) = crew.retried([known], without, {item.key: 0.0})
     assert better.standing.values["motor.gravity.torque"] == pytest.approx(UNBALANCE, rel=0.02)
     assert better.standing.cost < known.standing.cost - 10.0 * UNIMPORTANT and np.sum(better.gains) > 0.0

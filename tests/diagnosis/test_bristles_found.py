@@ -10,7 +10,6 @@ from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 from plant import PlantFriction
 
 from friction_ocp.diagnosis.bench import open_bench
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
@@ -46,8 +45,7 @@ def test_a_refit_finds_the_dry_friction_that_bristles_carry(tmp_path: Path) -> N
     plant = replace(plant, shafts=(replace(plant.shafts[0], friction=law),))
     bench = open_bench(load_problem(write_case(tmp_path, plant)), Execution(InProcess()))
     lost = without_dry_friction(bench.base)
-    rows = lost.linear.rows
-    found = screen(lost.model, lost.linear, blocks_of(rows), effects()["presliding"], "motor", clues_of(lost))
+    found = screen(lost, effects()["presliding"], "motor", clues_of(lost))
     assert found is not None
     start = found.values
     assert start["motor.friction.tau_c"] > 0.5 * COULOMB

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.blocks import blocks_of
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.screen import screen
@@ -25,7 +24,7 @@ import gaps
 def test_bristles_are_found_from_far_away(tmp_path: Path) -> None:
     """Nothing but noise is left of an axis whose base model lacks its bristles altogether."""
     base = fit_base(prepare(load_problem(gaps.aries_axis("presliding", tmp_path))))
-    seen = screen(base.model, base.linear, blocks_of(base.linear.rows), effects()["presliding"], "axis", clues_of(base))
+    seen = screen(base, effects()["presliding"], "axis", clues_of(base))
     assert seen is not None
     assert innovations(base).significant(0.01)
     assert not innovations(completed(quick_refit(base, seen))).significant(0.01)

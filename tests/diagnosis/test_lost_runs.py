@@ -20,7 +20,7 @@ from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.polishing import loosely
 from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
 from friction_ocp.diagnosis.screen import Screened, Start
-from friction_ocp.diagnosis.search import Search, beginning_at
+from friction_ocp.diagnosis.search import beginning_at, displaced
 from friction_ocp.effects.effect import Augmentation, Trial
 from friction_ocp.estimation.model import Model
 from friction_ocp.execution.executor import InProcess
@@ -135,5 +135,4 @@ def test_what_a_shape_displaced_is_tried_again(reshaped: bool) -> None:
         for item in done
     ]
     chosen, known = [candidate("backlash", 1.0)], {stiffening.key: stiffening}
-    again = Search.nearly(cast(Any, SimpleNamespace(rounds=rounds)), known, chosen)
-    assert again == ([stiffening] if reshaped else [])
+    assert displaced(cast(Any, rounds), known, chosen) == ([stiffening] if reshaped else [])

@@ -36,19 +36,21 @@ LEVEL = 0.01
 
 def rival(bench: Bench, key: Key) -> Rival:
     """Return a candidate refitted, with what it gains on recordings left out."""
-    found = screen(bench.current.model, bench.current.linear, bench.blocks, effects()[key[0]], key[1], bench.clues)
+    found = screen(bench.current, effects()[key[0]], key[1], bench.clues)
     assert found is not None
     fitted = completed(quick_refit(bench.current, found))
-    gains = bench.blocks.sums(held_out(bench.current)) - blocks_like(bench.current, fitted, bench.blocks)
+    gains = bench.current.blocks.sums(held_out(bench.current)) - blocks_like(
+        bench.current, fitted, bench.current.blocks
+    )
     return Rival.of(found, fitted, gains)
 
 
 def round_of(bench: Bench, keys: list[Key]) -> Round:
     """Return the round in which the first of some candidates was accepted."""
     rivals = [rival(bench, key) for key in keys]
-    choice = choose(rivals, bench.blocks, len(folds(bench.current)), LEVEL, np.random.default_rng(0))
+    choice = choose(rivals, bench.current.blocks, len(folds(bench.current)), LEVEL, np.random.default_rng(0))
     before = bench.current
-    return Round((), choice, before, excess(before.linear.rows, bench.blocks), rivals[0])
+    return Round((), choice, before, excess(before.linear.rows, bench.current.blocks), rivals[0])
 
 
 @pytest.mark.slow
