@@ -24,6 +24,7 @@ from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step, linear_constraints
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.kernel import SweepResult
 from friction_ocp.simulation.losses import Absolute
 
 SOFTENINGS = (0.1, 0.01, 0.001)
@@ -34,6 +35,8 @@ EXACT = 1e-4
 """Decrease of the mean loss that Newton steps may leave, over the rounding."""
 RIDGE = 1e-8
 """Added to the diagonal of a Hessian, relative: hardly any sample lies where a sharp loss is curved."""
+STRAIGHT = 1e-5
+"""Curvature of the loss of a sample over the largest one that is left out of a Newton step."""
 ACCEPTED = 1e-2
 """Share of the predicted decrease that a step has to gain."""
 LONG = 1e-2
@@ -70,19 +73,33 @@ class Rows:
         return self.constant + float(self.gradient @ step + 0.5 * step @ self.hessian @ step)
 
 
-def linearised(program: Program, point: Point) -> Rows:
-    """Return the residuals of a program without variable start states, and their derivatives."""
-    errors: list[FloatArray] = []
-    slopes: list[FloatArray] = []
-    starts = program.measured_starts(point.theta)
-    for index, result in enumerate(program.simulate_all(point, derivatives=True)):
-        item = program.experiments[index]
-        _, by_theta = program.space.numbers_and_slope(point.theta, item.name)
-        slope = program.output_slopes(index, result, by_theta, starts[index][1])
-        seen = np.isfinite(item.measured)
-        errors.append(program.residuals(index, result.y)[seen])
-        slopes.append(slope[seen])
-    return Rows(np.concatenate(errors), np.concatenate(slopes), *program.parameter_terms(point.theta))
+@dataclass(frozen=True)
+class Trial:
+    """A point, its residuals and its objective; the simulation is kept for what differentiates it."""
+
+    point: Point
+    errors: FloatArray
+    """(samples,) over the noise floor."""
+    objective: float
+    """Infinite where the simulation breaks down."""
+    results: tuple[SweepResult, ...]
+
+
+def tried(program: Program, point: Point, loss: Absolute) -> Trial:
+    """Simulate a program without variable start states at a point."""
+    results = tuple(program.simulate_trial(point))
+    errors = np.concatenate([program.seen_errors(index, result.y) for index, result in enumerate(results)])
+    total = float(np.sum(loss.cost(errors))) + program.parameter_terms(point.theta)[0]
+    return Trial(point, errors, total if np.isfinite(total) else np.inf, results)
+
+
+def linearised(program: Program, trial: Trial) -> Rows:
+    """Return the residuals of a trial and their derivatives."""
+    slopes = [
+        slope[np.isfinite(item.measured)]
+        for item, (_, slope) in zip(program.experiments, program.differentiate(trial.point, trial.results), strict=True)
+    ]
+    return Rows(trial.errors, np.concatenate(slopes), *program.parameter_terms(trial.point.theta))
 
 
 def solve_composite(
@@ -91,32 +108,34 @@ def solve_composite(
     """Minimise a program of the absolute loss without variable start states; the start is moved into the bounds."""
     loss, space, iteration = program.loss, program.space, 0
     assert isinstance(loss, Absolute)
-    point = Point(space.clip(start.theta), start.nodes)
-    rows = linearised(program, point)
-    now, scale, damping, slow = rows.cost(loss), rows.curvature(), FIRST_DAMPING, 0
-    if not np.isfinite(now):
-        return Solution(point, np.inf, 0, False, "the simulation breaks down at the start values")
+    now = tried(program, Point(space.clip(start.theta), start.nodes), loss)
+    if not np.isfinite(now.objective):
+        return Solution(now.point, np.inf, 0, False, "the simulation breaks down at the start values")
+    rows = linearised(program, now)
+    scale, damping, slow = rows.curvature(), FIRST_DAMPING, 0
     while iteration < tolerances.max_iterations:
-        step, expected = best_step(space, point.theta, rows, loss, damping * scale)
-        trial, predicted = Point(space.clip(point.theta + step), point.nodes), now - expected
-        gained = now - program.objective(trial)
-        if predicted <= max(tolerances.decrease * now, tolerances.negligible) and damping <= LONG:
-            message = "the predicted decrease is below the tolerance"
-            return Solution(trial if gained > 0 else point, now - max(gained, 0.0), iteration, True, message)
+        step, expected = best_step(space, now.point.theta, rows, loss, damping * scale)
+        trial = tried(program, Point(space.clip(now.point.theta + step), now.point.nodes), loss)
+        predicted, gained = now.objective - expected, now.objective - trial.objective
+        if predicted <= max(tolerances.decrease * now.objective, tolerances.negligible) and damping <= LONG:
+            end = trial if gained > 0 else now
+            return Solution(end.point, end.objective, iteration, True, "the predicted decrease is below the tolerance")
         if gained <= ACCEPTED * max(predicted, 0.0) or gained <= 0:
             damping *= 6.0
             if damping > LARGEST_DAMPING:
-                return Solution(point, now, iteration, True, "no step decreases the objective further", smooth=False)
+                message = "no step decreases the objective further"
+                return Solution(now.point, now.objective, iteration, True, message, smooth=False)
             continue
-        iteration, point, rows = iteration + 1, trial, linearised(program, trial)
-        now, scale = now - gained, np.maximum(scale, rows.curvature())
+        iteration, now, rows = iteration + 1, trial, linearised(program, trial)
+        scale = np.maximum(scale, rows.curvature())
         damping = max(damping * _trust(gained / max(predicted, 1e-300)), SMALLEST_DAMPING)
-        slow = slow + 1 if gained <= tolerances.progress * now else 0
-        if slow >= 3:
-            return Solution(point, now, iteration, True, "three steps in a row gained next to nothing", smooth=False)
+        slow = slow + 1 if gained <= tolerances.progress * now.objective else 0
         if watch is not None:
-            watch(iteration, now, point)
-    return Solution(point, now, iteration, False, "iteration limit reached")
+            watch(iteration, now.objective, now.point)
+        if slow >= 3:
+            message = "three steps in a row gained next to nothing"
+            return Solution(now.point, now.objective, iteration, True, message, smooth=False)
+    return Solution(now.point, now.objective, iteration, False, "iteration limit reached")
 
 
 def _trust(ratio: float) -> float:
@@ -173,7 +192,10 @@ class _Sheet:
         """Return Newton's move from a step, within the box, and the decrease that it predicts."""
         rows, constant = self.rows, self.rows.hessian + np.diag(self.damping)
         gradient = rows.slope.T @ (self.loss.weight(errors) * errors) + rows.gradient + constant @ step
-        hessian = (rows.slope * self.loss.curvature(errors)[:, None]).T @ rows.slope + constant
+        curved = self.loss.curvature(errors)
+        near = np.flatnonzero(curved > STRAIGHT * np.max(curved))
+        slope = rows.slope[near]
+        hessian = (slope * curved[near, None]).T @ slope + constant
         hessian[np.diag_indices_from(hessian)] *= 1.0 + RIDGE
         margins = box.margins + box.normals @ step
         move = bounded_step(hessian, gradient, box.lower - step, box.upper - step, box.normals, margins)

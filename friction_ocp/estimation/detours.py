@@ -19,7 +19,7 @@ from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
-HOPS = (0.005, 0.02, 0.05)
+HOPS = (0.002, 0.005, 0.01)
 """Restarts around the best end of a loss with kinks, in turn: by what share the quadratic model calls them worse."""
 BETTER = 1e-6
 """Decrease, relative, that counts as something better."""
@@ -37,7 +37,7 @@ class Persistence:
 
 
 REWEIGHTED = Persistence(6, 6, FINE)
-KEPT = Persistence(8, 24, Tolerances(decrease=1e-6, progress=1e-5))
+KEPT = Persistence(2, 24, Tolerances(decrease=1e-6, progress=1e-5))
 """Where the solver keeps the loss: restarts cost less, and fall into more of the shallow ends."""
 
 

@@ -9,6 +9,7 @@ from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.division import are_alike, divided_afresh, moved_share, reweighed
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
+from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, laid_for
 from friction_ocp.estimation.noise_level import most_likely, with_levels
 from friction_ocp.estimation.points_fit import fit_points
@@ -16,9 +17,10 @@ from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
-from friction_ocp.estimation.stages import WIDTHS
+from friction_ocp.estimation.stages import WIDTHS, keeps_the_loss
 from friction_ocp.estimation.starts import start_points
 from friction_ocp.estimation.synchronise import synchronised
+from friction_ocp.simulation.losses import Squares
 
 EXPECTED_PHASES = 16
 MOST_TURNS = 10
@@ -103,6 +105,8 @@ def _fit_once(model: Model, phases: Phases) -> Fitted:
     held = is_held(model.problem.drive)
     stated = bool(model.problem.estimation.process_noise)
     first = Plan(windowed(span), WIDTHS, True) if held and fits_free_run(model) else Plan(joined, WIDTHS[1:], stated)
+    if keeps_the_loss(model, first.builder(model, 0.0, Squares())):
+        return hop(model, fit_kept(model, first.builder, phases), phases)
     if held or not fits_free_run(model):
         return hop(model, staged(model, first, phases)[0], phases)
     return drifting(model, first, _longest(model, span), phases)

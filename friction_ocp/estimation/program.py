@@ -7,6 +7,7 @@ recording the gaps vanish and the program is the free run.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -186,6 +187,26 @@ class Program:
         starts = self.measured_starts(point.theta)
         return self.sweep.run_many([self._request(k, point, start, derivatives) for k, (start, _) in enumerate(starts)])
 
+    def simulate_trial(self, point: Point) -> list[SweepResult]:
+        """Simulate all recordings and keep what `differentiate` has a use for."""
+        starts = self.measured_starts(point.theta)
+        requests = [self._request(k, point, start, derivatives=False) for k, (start, _) in enumerate(starts)]
+        return self.sweep.run_many([replace(request, with_course=True) for request in requests])
+
+    def differentiate(self, point: Point, trial: Sequence[SweepResult]) -> list[tuple[SweepResult, FloatArray]]:
+        """Return by recording results with derivatives at a point that was simulated before.
+
+        Beside each (n, outputs, parameters) the derivatives of its outputs over their noise floors.
+        """
+        starts = self.measured_starts(point.theta)
+        requests = [
+            replace(self._request(k, point, start, derivatives=True), course=known.course)
+            for k, ((start, _), known) in enumerate(zip(starts, trial, strict=True))
+        ]
+        results = self.sweep.run_many(requests)
+        slopes = [self.space.numbers_and_slope(point.theta, item.name)[1] for item in self.experiments]
+        return [(result, self.output_slopes(k, result, slopes[k], starts[k][1])) for k, result in enumerate(results)]
+
     def _scored(
         self, point: Point, starts: list[tuple[FloatArray, FloatArray]], derivatives: bool = False
     ) -> list[tuple[SweepResult, Score]]:
@@ -223,6 +244,10 @@ class Program:
     def residuals(self, index: int, y: FloatArray) -> FloatArray:
         """Return (n, outputs) errors over the noise floor, NaN where there is no sample."""
         return (y - self.experiments[index].measured) / self.noise
+
+    def seen_errors(self, index: int, y: FloatArray) -> FloatArray:
+        """Return (samples,) errors over the noise floor of all samples that there are."""
+        return self.residuals(index, y)[np.isfinite(self.experiments[index].measured)]
 
     def sample_errors(self, index: int, y: FloatArray) -> FloatArray:
         """Return (n, outputs) errors over the noise floor, zero where there is no sample."""

@@ -31,18 +31,24 @@ def bounded_step(
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     matrix = hessian * np.outer(scale, scale)
     matrix[np.diag_indices_from(matrix)] += 1e-12
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    free = -inverse @ (gradient * scale)
+    if _is_within(scale * free, lower, upper, rows, margins):
+        return scale * free
     count = gradient.size
     normals = [np.diag(scale)[np.isfinite(lower)], -np.diag(scale)[np.isfinite(upper)], rows * scale]
     offsets = [lower[np.isfinite(lower)], -upper[np.isfinite(upper)], -margins]
     a, b = np.concatenate(normals).reshape(-1, count), np.concatenate(offsets)
     sizes = np.maximum(np.linalg.norm(a, axis=1), 1e-300)
-    return scale * _dual_active_set(matrix, gradient * scale, a / sizes[:, None], b / sizes)
+    return scale * _dual_active_set(inverse, free, a / sizes[:, None], b / sizes)
 
 
-def _dual_active_set(h: FloatArray, g: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Minimise 1/2 x'hx + g'x subject to a x >= b, rows of a normalised."""
-    inverse = np.asarray(np.linalg.inv(h), dtype=np.float64)
-    x = -inverse @ g
+def _is_within(step: FloatArray, lower: FloatArray, upper: FloatArray, rows: FloatArray, margins: FloatArray) -> bool:
+    return bool(np.all(step >= lower) and np.all(step <= upper) and np.all(margins + rows @ step >= 0.0))
+
+
+def _dual_active_set(inverse: FloatArray, x: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Move x, which minimises 1/2 x'hx + g'x, until a x >= b, rows of a normalised; `inverse` is that of h."""
     active: list[int] = []
     multipliers = np.zeros(0)
     for _ in range(50 + 10 * len(b)):

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.curriculum import enter_in_turn, introduced
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
@@ -21,14 +20,12 @@ from friction_ocp.estimation.stages import (
     WIDTHS,
     free_run,
     is_noise,
-    keeps_the_loss,
     loss_of_round,
     mean_error,
     predictions,
     relaxed,
     roundings_of,
 )
-from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
@@ -36,16 +33,12 @@ COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances(inner=4)
 LEAST = 1e-3
 """Decrease of the objective by three steps that is next to nothing, were the residuals noise."""
-THOROUGH = Tolerances(decrease=1e-13, negligible=1e-11, progress=1e-13)
-"""For ends that have to agree wherever they started."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
 FINALISTS = 5
 """Starts that are followed to the end."""
 SAME = 0.01
 """Relative difference of parameters up to which ends of equal objective are one."""
-GRID = 0.03
-"""Distance of the starts of rounds with kinks over the standard deviation."""
 
 Builder = Callable[[Model, float, AbstractLoss], Program]
 Solve = Callable[[Program, Point, Tolerances, Watch], Solution]
@@ -120,14 +113,14 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
             return ends
     simple = nested_space(model.problem, model.space)
     if simple is model.space:
-        return _best_first([*ends, *_rounds(model, plan, _plain_starts(model, plan, phases), "fit", phases)])
+        return _best_first([*ends, *_rounds(model, plan, _plain_starts(model, phases), "fit", phases)])
     exact = replace(plan, widths=RELEASED_WIDTHS)
     if conclusive:
         ends += _rounds(model, exact, [_predicted(model, phases)], "direct fit", phases)
         if is_sound(model, ends[-1]):
             return ends[-1:]
     inner = replace(model, space=simple)
-    nested = _rounds(inner, plan, _plain_starts(inner, plan, phases), "simpler friction", phases)
+    nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
     starts = released(model, simple, nested[0].solution.point.theta)
     return _best_first([*ends, *_rounds(model, exact, starts, "fit", phases)])
 
@@ -137,10 +130,8 @@ def _best_first(ends: Sequence[Fitted]) -> list[Fitted]:
     return sorted(ends, key=lambda fitted: fitted.solution.objective)
 
 
-def _plain_starts(model: Model, plan: Plan, phases: Phases) -> list[FloatArray]:
-    starts = [model.space.guess, _predicted(model, phases)]
-    sharp = keeps_the_loss(model, plan.builder(model, plan.widths[0], Squares()))
-    return [_same_start(model, plan, starts, phases)] if sharp else starts
+def _plain_starts(model: Model, phases: Phases) -> list[FloatArray]:
+    return [model.space.guess, _predicted(model, phases)]
 
 
 def _predicted(model: Model, phases: Phases) -> FloatArray:
@@ -162,16 +153,15 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     program = plan.builder(model, plan.widths[0], Squares())
     points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
     points.sort(key=lambda point: mean_error(program, point))
-    rounds = max(len(plan.widths), len(roundings_of(model, program)))
+    rounds = max(len(plan.widths), len(roundings_of(model)))
     iterations, ends = 0, list[Solution]()
     for k in range(rounds):
         program = plan.builder(model, plan.widths[min(k, len(plan.widths) - 1)], Squares())
         program = replace(program, loss=loss_of_round(model, program, points[0], k))
         watch = phases.begin(f"{name}, round {k + 1} of {rounds}")
         last = k == rounds - 1
-        solve = solve_composite if k > 0 and keeps_the_loss(model, program) else final_solver(model)
         enough = partial(is_sound_end, model, program) if plan.conclusive else _never
-        ends = race(program, points, limits(model) if last else COARSE, watch, solve, enough)
+        ends = race(program, points, limits(model) if last else COARSE, watch, final_solver(model), enough)
         if plan.conclusive and is_noise(program, ends[0]):
             ends = ends[:1]
         if not last:
@@ -215,29 +205,6 @@ def race(
         if enough(ends[-1]):
             break
     return sorted(ends, key=lambda end: end.objective)
-
-
-def _same_start(model: Model, plan: Plan, starts: Sequence[FloatArray], phases: Phases) -> FloatArray:
-    """Return the best that least squares with a smooth sign make of some starts, on a grid.
-
-    The rounds of an absolute loss have kinks at which the last digit of a start decides which way they go.
-    From here they go the same way wherever the fit started.
-    """
-    program = plan.builder(model, plan.widths[0], Squares())
-    points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
-    watch = phases.begin("least squares")
-    best = race(program, points, COARSE, watch, solve_gauss_newton)[0]
-    return _on_grid(program, solve_gauss_newton(program, best.point, THOROUGH, watch))
-
-
-def _on_grid(program: Program, end: Solution) -> FloatArray:
-    """Return the nearest point of a grid of about GRID of the standard deviations, far coarser than ends agree."""
-    theta, space = end.point.theta, program.space
-    told, _ = inverse_information(program.linearise(end.point).theta_theta)
-    samples = program.samples
-    variance = np.diag(told) * 2.0 * end.objective / max(samples, 1)
-    cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
-    return space.clip(cell * np.round(theta / cell))
 
 
 def is_sound(model: Model, fitted: Fitted) -> bool:

@@ -11,16 +11,13 @@ from friction_ocp.estimation.gap import gap_weights
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.parameter_space import has_nested
 from friction_ocp.estimation.program import Point, Program, Segments
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import IntArray
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 PREDICTION_SAMPLES = 20
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)
 """Rounding of the absolute loss over the mean error, stage by stage."""
-FEW_ROUNDINGS = (1.0, 0.05, 0.0004)
-"""The same for a solver that keeps the loss and linearises the residuals alone."""
 WIDTHS = (0.1, 0.02, 0.0)
 """Smoothing of the sign over the typical speed, stage by stage; the last is exact. Relaxed segments do without the
 first: there a wide smoothing only invents slopes and breaks at low speed."""
@@ -126,28 +123,20 @@ def _with_start(model: Model, cut: Segments) -> Segments:
 
 def mean_error(program: Program, point: Point) -> float:
     """Return the mean absolute error of all samples over their noise floors."""
-    sizes: list[FloatArray] = []
-    for index, (item, result) in enumerate(zip(program.experiments, program.simulate_all(point), strict=True)):
-        errors = program.residuals(index, result.y)
-        sizes.append(np.abs(errors[np.isfinite(item.measured)]))
-    return float(np.mean(np.concatenate(sizes)))
+    results = program.simulate_all(point)
+    errors = np.concatenate([program.seen_errors(index, result.y) for index, result in enumerate(results)])
+    return float(np.mean(np.abs(errors)))
 
 
-def roundings_of(model: Model, program: Program) -> tuple[float, ...]:
+def roundings_of(model: Model) -> tuple[float, ...]:
     """Return the roundings that a fit by the absolute loss goes through; none for another loss."""
-    if model.problem.estimation.loss != "absolute":
-        return ()
-    return FEW_ROUNDINGS if keeps_the_loss(model, program) else ROUNDINGS
+    return ROUNDINGS if model.problem.estimation.loss == "absolute" else ()
 
 
 def keeps_the_loss(model: Model, program: Program) -> bool:
-    """Whether a fit keeps the absolute loss as it is: the solver that can needs a program without nodes.
-
-    Friction with a simpler one nested in it has several deep ends, of which reweighting finds the same from everywhere.
-    """
+    """Whether a fit keeps the absolute loss as it is: the solver that can needs a program without nodes."""
     options = model.problem.estimation
-    able = options.loss == "absolute" and options.solver == "gauss_newton" and program.without_nodes
-    return able and not has_nested(model.problem)
+    return options.loss == "absolute" and options.solver == "gauss_newton" and program.without_nodes
 
 
 def loss_of_round(model: Model, program: Program, best: Point, number: int) -> AbstractLoss:
@@ -160,8 +149,7 @@ def loss_of_round(model: Model, program: Program, best: Point, number: int) -> A
         case "student_t":
             return StudentT()
         case "absolute":
-            roundings = roundings_of(model, program)
-            return Absolute(roundings[min(number, len(roundings) - 1)] * mean_error(program, best))
+            return Absolute(ROUNDINGS[min(number, len(ROUNDINGS) - 1)] * mean_error(program, best))
 
 
 def is_noise(program: Program, end: Solution) -> bool:

@@ -43,6 +43,8 @@ STEPS_WORTH_A_THREAD = 1500
 class CompiledKernel(AbstractKernel):
     """Calls the compiled loop; ctypes lets other threads run meanwhile."""
 
+    keeps_course = True
+
     def __init__(self, library: ctypes.CDLL) -> None:
         self._sweep = library.friction_ocp_sweep
         self._sweep.restype = None

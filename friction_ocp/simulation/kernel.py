@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -45,6 +46,10 @@ class SweepRequest:
     """States that go on where the segment before ended, the others beginning anew; without derivatives only."""
     yardstick: Yardstick | None = None
     """With it the sweep sums a score over each segment in place of keeping every derivative of its outputs."""
+    with_course: bool = False
+    """Whether the course of the states is wanted, where the kernel keeps it; without derivatives only."""
+    course: FloatArray | None = None
+    """The course that the same request has without derivatives, where it is known: it is not simulated again."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,8 @@ class SweepResult:
     """(segments, states, states + active)."""
     states: FloatArray | None = None
     """(n, states), where asked for."""
+    course: FloatArray | None = None
+    """(n, states) states before the ticks of each node, where asked for and kept."""
     score: Score | None = None
     """Where there is a yardstick."""
 
@@ -104,6 +111,9 @@ class Piece:
 
 class AbstractKernel(ABC):
     """Computes sweeps of one drive."""
+
+    keeps_course: ClassVar[bool] = False
+    """Whether it has a use for the course of the states."""
 
     @abstractmethod
     def run(self, pieces: Sequence[Piece], threads: int = 1) -> None:

@@ -73,8 +73,7 @@ class Absolute(AbstractLoss):
         return 1.0 / np.sqrt(residual * residual + self.rounding**2)
 
     def curvature(self, residual: FloatArray) -> FloatArray:
-        squared = residual * residual + self.rounding**2
-        return self.rounding**2 / (squared * np.sqrt(squared))
+        return self.rounding**2 * self.weight(residual) ** 3
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,10 @@ class Parts(AbstractPlan):
     course: FloatArray
     """(n, states) states before the ticks of each node, once the piece was simulated without derivatives."""
 
-    def ahead(self) -> Piece:
-        """Return the states alone."""
+    def ahead(self) -> Piece | None:
+        """Return the states alone, where they are not known."""
+        if self.piece.request.course is not None:
+            return None
         plain = replace(self.piece.request, derivatives=False, with_states=False, yardstick=None)
         into = SweepResult(self.piece.into.y, np.empty_like(self.piece.into.end))
         return Piece(plain, into, self.course, observed=False)
@@ -43,7 +45,7 @@ class Parts(AbstractPlan):
         request, into = self.piece.request, self.piece.into
         x0 = self.course[self.first[:-1]]
         x0[self._begins] = request.x0
-        smaller = replace(request, first=self.first, x0=x0)
+        smaller = replace(request, first=self.first, x0=x0, course=None)
         found = empty_result(smaller, x0.shape[1], into.y.shape[1], self._columns - x0.shape[1])
         return Piece(smaller, replace(found, y=into.y, states=into.states, dy=into.dy))
 
@@ -99,5 +101,5 @@ def parts_of(piece: Piece) -> Parts | None:
         first += starts
         owner += [segment] * len(starts)
     ends = np.array([*first, request.first[-1]], dtype=np.int64)
-    course = np.empty((request.grid.time.size, request.x0.shape[1]))
+    course = np.empty((request.grid.time.size, request.x0.shape[1])) if request.course is None else request.course
     return Parts(piece, ends, np.array(owner, dtype=np.int64), course)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import casadi as ca
@@ -69,14 +70,17 @@ class Sweep:
     def run_many(self, requests: Sequence[SweepRequest]) -> list[SweepResult]:
         """Simulate several recordings, side by side where there is more than one processor."""
         results = [self._empty(request) for request in requests]
-        pieces = [Piece(*pair) for pair in zip(requests, results, strict=True)]
+        pieces = [Piece(request, into, into.course) for request, into in zip(requests, results, strict=True)]
         count(sum(piece.effort for piece in pieces))
         self.kernel.run(pieces, worker_count())
         return results
 
     def _empty(self, request: SweepRequest) -> SweepResult:
         drive = self.drive
-        return empty_result(request, len(drive.state_names), len(drive.output_names), len(self.active))
+        result = empty_result(request, len(drive.state_names), len(drive.output_names), len(self.active))
+        if not (request.with_course and self.kernel.keeps_course):
+            return result
+        return replace(result, course=np.empty((request.grid.time.size, len(drive.state_names))))
 
 
 @kept(64)

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from friction_ocp.estimation.composite import Rows, best_step, linearised, solve_composite
+from friction_ocp.estimation.composite import Rows, best_step, linearised, solve_composite, tried
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, prepare_fit
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.progress import Phases, silent
+from friction_ocp.estimation.rounds import windowed
 from friction_ocp.estimation.stages import free_run, mean_error
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.losses import Absolute
@@ -58,14 +61,32 @@ def test_a_step_is_the_least_absolute_deviation(model: Model, bound: float) -> N
 
 def test_slopes_are_those_of_the_residuals(program: Program) -> None:
     """Central differences of the residuals by every parameter."""
-    at = start(program)
-    rows = linearised(program, at)
+    at, loss = start(program), Absolute(0.3)
+    rows = linearised(program, tried(program, at, loss))
     for k, size in enumerate(1e-6 * np.maximum(np.abs(at.theta), 1e-2)):
         step = size * np.eye(at.theta.size)[k]
-        ahead, behind = (linearised(program, Point(at.theta + sign * step, at.nodes)).errors for sign in (1, -1))
+        ahead, behind = (tried(program, Point(at.theta + sign * step, at.nodes), loss).errors for sign in (1, -1))
         slope = (ahead - behind) / (2 * size)
         assert np.median(np.abs(rows.slope[:, k] - slope)) < 1e-4 * np.max(np.abs(slope))
-    assert rows.cost(Absolute(0.3)) == pytest.approx(program.objective(at))
+    assert rows.cost(loss) == pytest.approx(program.objective(at))
+
+
+def test_a_trial_saves_a_simulation_and_changes_nothing(program: Program) -> None:
+    """Derivatives after a trial are bit for bit those of a simulation that knows nothing of it."""
+    at = start(program)
+    known = program.differentiate(at, program.simulate_trial(at))
+    for (result, _), alone in zip(known, program.simulate_all(at, derivatives=True), strict=True):
+        assert np.array_equal(result.y, alone.y)
+        assert result.dy is not None and alone.dy is not None
+        assert np.array_equal(result.dy, alone.dy)
+
+
+def test_fits_from_other_guesses_are_the_same_to_the_last_digit(model: Model) -> None:
+    """A start three times as far: the way of a kept loss begins at the same point of a grid."""
+    other = replace(model, space=model.space.moved(model.space.clip(3.0 * model.space.guess)))
+    ends = [fit_kept(item, windowed(None), Phases(silent, 4)).solution for item in (model, other)]
+    assert np.array_equal(ends[0].point.theta, ends[1].point.theta)
+    assert ends[0].objective == ends[1].objective
 
 
 def test_it_ends_no_higher_than_reweighting_and_in_fewer_steps(program: Program) -> None:
