@@ -19,7 +19,7 @@ from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
-HOPS = (0.002, 0.005, 0.01)
+HOPS = (0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks, in turn: by what share the quadratic model calls them worse."""
 BETTER = 1e-6
 """Decrease, relative, that counts as something better."""
@@ -37,7 +37,7 @@ class Persistence:
 
 
 REWEIGHTED = Persistence(6, 6, FINE)
-KEPT = Persistence(2, 24, Tolerances(decrease=1e-6, progress=1e-5))
+KEPT = Persistence(3, 24, Tolerances(decrease=1e-6, progress=1e-5))
 """Where the solver keeps the loss: restarts cost less, and fall into more of the shallow ends."""
 
 
@@ -60,7 +60,10 @@ def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
 
 
 def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
-    """Leave local minima of a loss with kinks: restart from points that the quadratic model calls slightly worse."""
+    """Leave local minima of a loss with kinks: restart from points that the quadratic model calls slightly worse.
+
+    A restart goes by way of softer losses, or at once to the sharp one where those lead to where another has been.
+    """
     program, best, iterations = fitted.program, fitted.solution, fitted.solution.iterations
     if not isinstance(program.loss, Absolute):
         return fitted
@@ -74,13 +77,14 @@ def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     failed, known = 0, [list[Solution]() for _ in softer]
     for k in range(tries.most):
         watch = phases.begin(f"hop {k + 1}")
-        point: Point | None = _hopped(model, program, best, HOPS[k % len(HOPS)], rng)
+        hopped = _hopped(model, program, best, HOPS[k % len(HOPS)], rng)
+        point: Point | None = hopped
         for stage, ends in zip(softer, known, strict=True):
             point = _elsewhere(solve(stage, point, COARSE, watch), ends)
             if point is None:
                 break
-        end = best if point is None else solve(program, point, tries.tolerances, watch)
-        iterations += 0 if point is None else end.iterations
+        end = solve(program, point or hopped, tries.tolerances, watch)
+        iterations += end.iterations
         failed = 0 if end.objective < (1.0 - BETTER) * best.objective else failed + 1
         best = min(best, end, key=lambda solution: solution.objective)
         if failed == tries.patience:
