@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
+from friction_ocp.diagnosis.reexamine import exchanged, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
@@ -116,6 +116,9 @@ class Search:
                     break
             if self._exhausted():
                 break
+        if len(set(self.accepted)) > 1 and innovations(self.bench.current).significant(self.level):
+            current, self.accepted = without_small(self.bench, self.accepted)
+            self.bench = self.bench.at(current)
         if self.accepted and not self._helps():
             self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
