@@ -46,7 +46,7 @@ leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
-joined segments, beside those of free runs that are lost."""
+joined segments, and, whatever they promise, for those of free runs that are lost."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
 MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
@@ -300,13 +300,13 @@ def to_refit(
 ) -> tuple[list[Screened], list[Screened]]:
     """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
 
-    What loosely joined segments promise is tried beside what lost free runs do, not instead: neither prediction tells
-    for certain what is worth little.
+    The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
+    share of the largest promise that is: neither prediction tells for certain what is worth little.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if chosen and current.lost:
-        begun = beginning_at(chosen, _promising(crew.screened_loosely(keys)))
-        return with_resembling(begun, found), []
+        first = [item for item in chosen if item.starts][:BEGUN]
+        return with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found), []
     unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
     return with_resembling(chosen, found, current.astray), unfitted
 
