@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.reexamine import exchanged, without_superfluous
+from friction_ocp.diagnosis.reexamine import exchanged, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
@@ -45,8 +45,8 @@ all whose objective is within this factor; and what resembles the best. As many 
 leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
-has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of free runs
-that are lost, and for those of loosely joined segments beside them."""
+has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
+joined segments, and, whatever they promise, for those of free runs that are lost."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
 MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
@@ -116,6 +116,9 @@ class Search:
                     break
             if self._exhausted():
                 break
+        if len(set(self.accepted)) > 1 and innovations(self.bench.current).significant(self.level):
+            current, self.accepted = without_small(self.bench, self.accepted)
+            self.bench = self.bench.at(current)
         if self.accepted and not self._helps():
             self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
@@ -271,13 +274,7 @@ class Search:
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen += displaced(self.rounds, known, chosen)
-        unfitted = list[Screened]()
-        if chosen and current.lost:
-            chosen = beginning_at(_promising(chosen), _promising(crew.screened_loosely(list(known))))
-            chosen = with_resembling(chosen, found)
-        else:
-            chosen = with_resembling(chosen, found, current.astray)
-            unfitted = _promising(crew.screened_unfitted(list(known))) if chosen and current.astray else []
+        chosen, unfitted = to_refit(crew, chosen, found)
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         asked = {key: -np.inf if key in again else enough for key in known}
@@ -296,6 +293,22 @@ class Search:
 def _promising(found: Sequence[Screened]) -> list[Screened]:
     """Return the few candidates that promise most."""
     return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
+
+
+def to_refit(
+    crew: Crew, chosen: Sequence[Screened], found: Sequence[Screened]
+) -> tuple[list[Screened], list[Screened]]:
+    """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
+
+    The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
+    share of the largest promise that is: neither prediction tells for certain what is worth little.
+    """
+    current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
+    if chosen and current.lost:
+        first = [item for item in chosen if item.starts][:BEGUN]
+        return with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found), []
+    unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
+    return with_resembling(chosen, found, current.astray), unfitted
 
 
 def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:

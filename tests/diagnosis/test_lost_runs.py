@@ -20,7 +20,8 @@ from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.polishing import loosely
 from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
 from friction_ocp.diagnosis.screen import Screened, Start
-from friction_ocp.diagnosis.search import beginning_at, displaced
+from friction_ocp.diagnosis.search import BEGUN, beginning_at, displaced, to_refit
+from friction_ocp.diagnosis.worth import Key
 from friction_ocp.effects.effect import Augmentation, Trial
 from friction_ocp.estimation.model import Model
 from friction_ocp.execution.executor import InProcess
@@ -111,9 +112,25 @@ def test_the_segments_of_a_footing_need_no_looser_ones(tmp_path: Path) -> None:
     assert crew_of(bench).screened_loosely(NAMES) == []
 
 
-def candidate(effect: str, *sizes: float) -> Screened:
+def candidate(effect: str, *sizes: float, gain: float = 1.0) -> Screened:
     starts = tuple(Start(Trial(({"size": 1.0},)), (size,), {}) for size in sizes)
-    return Screened(effect, "motor", 1.0, 0.0, starts, Augmentation(cast(Any, None), {"size": 0.0}, ()))
+    return Screened(effect, "motor", gain, 0.0, starts, Augmentation(cast(Any, None), {"size": 0.0}, ()))
+
+
+def test_what_lost_runs_promise_is_tried_beside_what_loosely_joined_segments_do() -> None:
+    """The first few stay chosen, be it for a third of the largest promise: neither prediction holds."""
+    large, small = candidate("cogging", 1.0, gain=3.0), candidate("load_dependence", 1.0)
+    last = [candidate("warm_up", 1.0, gain=0.5) for _ in range(BEGUN)]
+    loose = candidate("position_ripple", 1.0, gain=5.0)
+    bench = SimpleNamespace(current=SimpleNamespace(lost=True, astray=True))
+
+    def screened_loosely(keys: list[Key]) -> list[Screened]:
+        return [loose]
+
+    crew = cast(Any, SimpleNamespace(bench=bench, screened_loosely=screened_loosely))
+    chosen, unfitted = to_refit(crew, [large, small, *last], [large, small])
+    assert chosen == [large, small, *last[: BEGUN - 2], loose]
+    assert unfitted == []
 
 
 def test_a_refit_begins_where_either_prediction_says() -> None:
