@@ -27,6 +27,8 @@ class Influence:
     """(rows,) the weight of each row in the information matrix."""
     recording: IntArray
     """(rows,) index of the recording; static points count on behind the recordings."""
+    window: IntArray
+    """(rows,) index of the free run within its recording; 0 where segments are joined, and for static points."""
     time: FloatArray
     """(rows,) s; the index of a static point."""
     prior: FloatArray
@@ -47,9 +49,18 @@ def influence(program: Program, point: Point) -> Influence:
     ]
     parts += [_of_points(term, program.space, point.theta) for term in program.static]
     jacobian, residual, weight, curvature, time = (np.concatenate(column) for column in zip(*parts, strict=True))
+    windows = [_windows(program, index, part[4]) for index, part in enumerate(parts)]
     recording = np.concatenate([np.full(part[1].size, index) for index, part in enumerate(parts)])
     pull = np.where(np.isfinite(program.space.prior_std), program.space.prior_std, np.inf) ** -2.0
-    return Influence(jacobian, residual, weight, curvature, recording, time, np.diag(pull))
+    window = np.concatenate(windows)
+    return Influence(jacobian, residual, weight, curvature, recording, window, time, np.diag(pull))
+
+
+def _windows(program: Program, index: int, time: FloatArray) -> IntArray:
+    """Return (rows,) which free run of a recording, or of static points behind the recordings, each row belongs to."""
+    if index >= len(program.experiments) or program.segments[index].gap_weight is not None:
+        return np.zeros(time.size, dtype=np.int64)
+    return program.segments[index].owner(np.searchsorted(program.experiments[index].grid.time, time))
 
 
 def _of_points(

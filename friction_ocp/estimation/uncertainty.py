@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.influence import Influence
 from friction_ocp.estimation.parameter_space import ParameterSpace
-from friction_ocp.simulation.grid import BoolArray, FloatArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 stats: Any = _stats  # its own types are incomplete
 
@@ -19,8 +20,12 @@ NO_INFORMATION = 1e-30
 """Stands for the information on a parameter that no residual depends on."""
 SMALLEST_INFORMATION, UNTOLD = 1e-14, 1e-12
 """Scaled information below which rounding decides, and from which a direction counts as told by the data."""
-MIN_BLOCKS, MAX_BLOCKS = 24, 200
-"""Blocks of residuals that the robust covariance is summed over: enough to average, long enough to be independent."""
+MIN_BLOCKS, MAX_BLOCKS = 3, 200
+"""Blocks of residuals that the robust covariance is summed over: as many as are long enough to be independent. Where
+these are few, the t distribution says how little a variance from them is known."""
+MOST_LEVERAGE = 0.9
+"""Share of what is known about a direction that leaving out a block may take: without a block that alone tells of it
+nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +63,12 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
     """Return the covariance on the parameters that are not at a bound.
 
     With white residuals it is the inverse Hessian; otherwise, and for losses that are no likelihood of the noise,
-    the sandwich H^-1 B H^-1 with B summed over blocks of neighbouring residuals (Huber 1967, Hall 1985).
+    what leaving out one block of neighbouring residuals after the other makes of it: the sandwich H^-1 B H^-1 with each
+    block's share of the information taken out (Huber 1967; Bell & McCaffrey 2002, the jackknife). Without that few
+    blocks with much to tell make intervals too short.
     """
-    information = found.information
-    if absolute:
-        information = found.jacobian.T @ (_density_weight(found)[:, None] * found.jacobian) + found.prior
+    weight = _density_weight(found) if absolute else found.curvature
+    information = found.jacobian.T @ (weight[:, None] * found.jacobian) + found.prior
     bound = space.at_bounds(theta)
     free = ~bound
     told, untold = inverse_information(information[np.ix_(free, free)])
@@ -70,10 +76,11 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
     if white and not absolute:
         covariance[np.ix_(free, free)] = told + untold
         return Uncertainty(covariance, "gauss_newton", bound, np.inf, information)
-    scores = _block_scores(found, free)
-    reach, prior = told @ scores.T, found.prior[np.ix_(free, free)]
-    covariance[np.ix_(free, free)] = reach @ reach.T + told @ prior @ told + untold
-    return Uncertainty(covariance, "sandwich", bound, float(len(scores) - 1), information)
+    moved = _jackknifed(found, weight, free)
+    count, prior = len(moved), found.prior[np.ix_(free, free)]
+    moved = (moved - moved.mean(axis=0)) * np.sqrt((count - 1) / count)
+    covariance[np.ix_(free, free)] = moved.T @ moved + told @ prior @ told + untold
+    return Uncertainty(covariance, "sandwich", bound, float(count - 1), information)
 
 
 def _density_weight(found: Influence) -> FloatArray:
@@ -99,20 +106,39 @@ def inverse_information(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return (vectors * told) @ vectors.T / scale, (vectors * untold) @ vectors.T / scale
 
 
-def _block_scores(found: Influence, free: BoolArray) -> FloatArray:
-    """Return (blocks, parameters) centred sums of scores, scaled so that their outer products sum to their variance."""
-    scores = found.jacobian[:, free] * found.score_weight[:, None]
-    recordings = np.unique(found.recording)
-    length = _correlation_rows(found)
-    blocks: list[FloatArray] = []
-    for index in recordings:
-        own = scores[found.recording == index]
-        wanted = int(np.clip(own.shape[0] / (4.0 * length), MIN_BLOCKS / recordings.size, MAX_BLOCKS))
-        blocks += [part.sum(axis=0) for part in np.array_split(own, max(wanted, 2))]
-    stacked = np.array(blocks)
-    count = stacked.shape[0]
-    centred = stacked - stacked.mean(axis=0)
-    return centred * np.sqrt(count / (count - 1))
+def _jackknifed(found: Influence, weight: FloatArray, free: BoolArray) -> FloatArray:
+    """Return (blocks, parameters) how far leaving out each block moves the free parameters, to first order."""
+    slope, prior = found.jacobian[:, free], found.prior[np.ix_(free, free)]
+    own = [(slope[rows], weight[rows], found.score_weight[rows]) for rows in _blocks(found)]
+    parts = [(part.T @ (share[:, None] * part), part.T @ score) for part, share, score in own]
+    whole = sum((part for part, _ in parts), prior)
+    told, _ = inverse_information(whole)
+    return np.array([inverse_information(whole - _leverage_limit(told, part) * part)[0] @ pull for part, pull in parts])
+
+
+def _leverage_limit(told: FloatArray, part: FloatArray) -> float:
+    """Return the share of a block's information that may be left out."""
+    leverage = float(np.max(np.linalg.eigvals(told @ part).real, initial=0.0))
+    return min(1.0, MOST_LEVERAGE / max(leverage, 1e-300))
+
+
+def _blocks(found: Influence) -> list[IntArray]:
+    """Return the rows of blocks of neighbouring residuals: several correlation lengths, or whole free runs.
+
+    The errors of a free run go on to its end, and into none that starts afresh.
+    """
+    places = [np.flatnonzero(found.recording == index) for index in np.unique(found.recording)]
+    runs: list[list[IntArray]] = [np.split(rows, np.flatnonzero(np.diff(found.window[rows])) + 1) for rows in places]
+    length, apart = _correlation_rows(found), sum(map(len, runs)) >= MIN_BLOCKS
+    blocks: list[IntArray] = []
+    for rows, own in zip(places, runs, strict=True):
+        wanted = max(int(np.clip(rows.size / (4.0 * length), MIN_BLOCKS / len(places), MAX_BLOCKS)), 2)
+        if apart and len(own) > 1:
+            cuts = np.linspace(0, len(own), min(wanted, len(own)) + 1).astype(int)
+            blocks += [np.concatenate(own[begin:end]) for begin, end in pairwise(cuts)]
+        else:
+            blocks += np.array_split(rows, wanted)
+    return blocks
 
 
 def _correlation_rows(found: Influence) -> float:

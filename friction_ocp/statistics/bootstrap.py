@@ -16,7 +16,6 @@ from friction_ocp.estimation.influence import Influence, influence
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
-from friction_ocp.estimation.uncertainty import MIN_BLOCKS
 from friction_ocp.execution.task import Json, Task
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.answer import Answer, answer
@@ -27,6 +26,8 @@ from friction_ocp.statistics.workshop import Workshop
 
 DEFAULT_DRAWS = 200
 FEWEST_DRAWS = 20
+FEWEST_BLOCKS = 24
+"""Of all recordings: the signs of fewer have too few combinations. What is wanted beyond is told."""
 PERCENTILES = (2.5, 50.0, 97.5)
 
 Method = Literal["refit", "one_step"]
@@ -100,7 +101,7 @@ def bootstrap(problem: Problem, draws: int = DEFAULT_DRAWS, execution: Execution
 def residual_blocks(workshop: Workshop) -> tuple[Blocks, ...]:
     """Return the blocks of every recording: as long as its most correlated channel asks for, if enough are left."""
     program, point = workshop.fitted.program, workshop.fitted.solution.point
-    fewest = int(np.ceil(MIN_BLOCKS / len(program.experiments)))
+    fewest = int(np.ceil(FEWEST_BLOCKS / len(program.experiments)))
     blocks: list[Blocks] = []
     for index, item in enumerate(program.experiments):
         errors = program.residuals(index, program.simulate(index, point).y)

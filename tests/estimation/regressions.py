@@ -37,6 +37,7 @@ def regression(
     score: np.ndarray | None = None,
     prior_std: np.ndarray | float = np.inf,
     recordings: int = 1,
+    window: np.ndarray | None = None,
 ) -> Influence:
     """Return the influence of residuals `noise` of unit floor; `score` is rho'(r) where it is not r itself."""
     rows, parameters = jacobian.shape
@@ -47,6 +48,7 @@ def regression(
         score_weight=noise if score is None else score,
         curvature=np.ones(rows),
         recording=np.sort(np.arange(rows) % recordings),
+        window=np.zeros(rows, dtype=np.int64) if window is None else window,
         time=0.01 * np.arange(rows),
         prior=np.diag(pull),
     )

@@ -22,10 +22,15 @@ def design(rows: int) -> np.ndarray:
 
 
 def judged(
-    x: np.ndarray, noise: np.ndarray, white: bool, prior_std: np.ndarray | float = np.inf, recordings: int = 1
+    x: np.ndarray,
+    noise: np.ndarray,
+    white: bool,
+    prior_std: np.ndarray | float = np.inf,
+    recordings: int = 1,
+    window: np.ndarray | None = None,
 ) -> Uncertainty:
     """Return the uncertainty of a regression whose parameters are well inside their bounds."""
-    found = regression(x, noise, prior_std=prior_std, recordings=recordings)
+    found = regression(x, noise, prior_std=prior_std, recordings=recordings, window=window)
     return uncertainty(space(np.ones(x.shape[1]), -10, 10, prior_std), np.ones(x.shape[1]), found, white, False)
 
 
@@ -69,6 +74,50 @@ def test_the_sandwich_knows_correlated_noise(recordings: int) -> None:
     mean = np.mean([np.diag(judged(x, fit, False, recordings=recordings).covariance) for fit in fits], axis=0)
     assert mean == pytest.approx(exact, rel=SCATTER)
     assert np.all(exact > 5.0 * np.diag(inverse))
+
+
+def refitted(x: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much noise moves the estimate of a regression, and the residuals of that."""
+    moved = np.linalg.solve(x.T @ x, x.T @ noise)
+    return moved, noise - x @ moved
+
+
+def test_errors_that_last_a_whole_free_run_are_counted_by_free_runs() -> None:
+    """Each of 40 windows is off by a constant of its own; blocks that straddle windows would see half of it."""
+    rows, count, draws = 4000, 40, 80
+    window, rng = np.repeat(np.arange(count), rows // count), np.random.default_rng(5)
+    x = np.random.default_rng(6).standard_normal((count, 3))[window] + 0.1 * design(rows)
+    inverse = np.linalg.inv(x.T @ x)
+    shares = np.array([inverse @ x[window == k].sum(axis=0) for k in range(count)])
+    noises = [rng.standard_normal(count)[window] + 0.01 * rng.standard_normal(rows) for _ in range(draws)]
+    found = [judged(x, refitted(x, noise)[1], False, window=window) for noise in noises]
+    assert all(item.freedom <= count - 1 for item in found)
+    mean = np.mean([np.diag(item.covariance) for item in found], axis=0)
+    assert mean == pytest.approx(np.sum(shares**2, axis=0), rel=SCATTER)
+
+
+def test_few_independent_stretches_make_wide_intervals() -> None:
+    """Errors that wander for a quarter of the recording: the t distribution of few blocks keeps the coverage."""
+    rows, draws, rng = 2000, 200, np.random.default_rng(8)
+    x, hits = design(rows)[:, :2], []
+    for _ in range(draws):
+        moved, noise = refitted(x, autoregressive(0.995, rows, rng))
+        found = judged(x, noise, white=False)
+        low, high = found.interval(moved).T
+        hits.append((low <= 0.0) & (high >= 0.0))
+    assert np.mean(hits) > 0.85
+
+
+def test_a_block_that_tells_most_is_left_out_as_far_as_others_tell() -> None:
+    """A tenth of the rows holds most information: leaving it out moves the estimate by far more than its score."""
+    rows, rng = 2000, np.random.default_rng(9)
+    x = np.ones((rows, 1))
+    x[:200] *= 6.0
+    z = []
+    for _ in range(200):
+        moved, noise = refitted(x, autoregressive(0.9, rows, rng))
+        z.append(moved[0] / judged(x, noise, white=False).std_error[0])
+    assert np.std(z) < 1.3
 
 
 def test_the_sandwich_agrees_where_noise_is_white() -> None:
