@@ -45,15 +45,15 @@ def fit_kept(model: Model, builder: Builder, phases: Phases) -> Fitted:
     inner = replace(model, space=simple)
     softly = _softly(inner, builder, phases)
     size = mean_error(builder(inner, 0.0, Squares()), softly.point)
-    ends = [softly]
+    ends, spent = [softly], 0
     if simple is not model.space:
         program = builder(model, RELEASED_WIDTHS[0], Absolute(SOFT * size))
-        starts = released(model, simple, softly.point.theta)
+        starts, spent = released(model, simple, softly.point.theta), softly.iterations
         ends = _raced(program, [_started(program, theta) for theta in starts], phases.begin("released friction"))
     sharp, watch = builder(model, 0.0, Absolute(SHARP * size)), phases.begin("sharp loss")
     finals = race(sharp, [end.point for end in ends], FAR, watch, solve_composite)
-    iterations = sum(end.iterations for end in (softly, *ends, *finals))
-    return Fitted(replace(finals[0], iterations=iterations), sharp)
+    spent += sum(end.iterations for end in (*ends, *finals))
+    return Fitted(replace(finals[0], iterations=spent), sharp)
 
 
 def _softly(model: Model, builder: Builder, phases: Phases) -> Solution:
@@ -82,6 +82,8 @@ def _started(program: Program, theta: FloatArray) -> Point:
 def _on_grid(program: Program, end: Solution) -> FloatArray:
     """Return the nearest point of a grid of about GRID of the standard deviations."""
     theta, space = end.point.theta, program.space
+    if not np.isfinite(end.objective):
+        return theta
     told, _ = inverse_information(program.linearise(end.point).theta_theta)
     variance = np.diag(told) * 2.0 * end.objective / max(program.samples, 1)
     cell = np.exp2(np.round(np.log2(np.maximum(GRID * np.sqrt(variance), 1e-300))))
