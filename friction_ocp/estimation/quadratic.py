@@ -7,6 +7,9 @@ import numpy as np
 
 from friction_ocp.simulation.grid import FloatArray
 
+ROUNDING = 1e-12
+"""Distance to a bound over that between both, below which a step ends on it."""
+
 
 def linear_constraints(constraints: ca.Function | None, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return A (constraints, parameters) and b: margins are b + A d to first order, and may not turn negative."""
@@ -40,7 +43,9 @@ def bounded_step(
     offsets = [lower[np.isfinite(lower)], -upper[np.isfinite(upper)], -margins]
     a, b = np.concatenate(normals).reshape(-1, count), np.concatenate(offsets)
     sizes = np.maximum(np.linalg.norm(a, axis=1), 1e-300)
-    return scale * _dual_active_set(inverse, free, a / sizes[:, None], b / sizes)
+    step = scale * _dual_active_set(inverse, free, a / sizes[:, None], b / sizes)
+    near = np.where(np.isfinite(upper - lower), ROUNDING * (upper - lower), 0.0)
+    return np.where(step - lower <= near, lower, np.where(upper - step <= near, upper, step))
 
 
 def _is_within(step: FloatArray, lower: FloatArray, upper: FloatArray, rows: FloatArray, margins: FloatArray) -> bool:

@@ -38,6 +38,17 @@ def test_bounds_agree_with_scipy(seed: int, count: int) -> None:
 
 
 @settings(deadline=None, max_examples=100)
+@given(st.integers(0, 10**6), st.integers(1, 8))
+def test_a_step_to_a_bound_ends_on_it(seed: int, count: int) -> None:
+    """To the last digit, not a rounding error beside it."""
+    jacobian, residual, lower, upper = random_problem(seed, count)
+    step = bounded_step(jacobian.T @ jacobian, jacobian.T @ residual, lower, upper, np.zeros((0, count)), np.zeros(0))
+    near = np.minimum(step - lower, upper - step) < 1e-12 * (upper - lower)
+    between = np.isfinite(upper - lower)
+    assert np.all(np.isin(step[near & between], np.concatenate([lower, upper])))
+
+
+@settings(deadline=None, max_examples=100)
 @given(st.integers(0, 10**6), st.integers(2, 7), st.integers(1, 4))
 def test_optimality_conditions_hold(seed: int, count: int, constraints: int) -> None:
     """The step is feasible, and its gradient is a positive combination of the normals of active constraints."""
