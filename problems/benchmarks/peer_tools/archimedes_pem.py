@@ -49,7 +49,8 @@ def solve(case: Case) -> Answer:
         values = [p[k] * roots[k] for k in range(roots.size)]
         states = [x[k] for k in range(case.state_scale.size)]
         rows = case.outputs(states, u, values, np)
-        return np.hstack([rows[k] / case.noise[k] for k in range(outputs)])
+        scaled = [rows[k] / case.noise[k] for k in range(outputs)]
+        return np.hstack(scaled) if outputs > 1 else np.atleast_1d(scaled[0])  # its hstack takes two or more
 
     noise = np.linalg.inv(case.gap_root(period))
     predictor = ExtendedKalmanFilter(dyn=advance, obs=seen, Q=noise @ noise.T, R=np.eye(outputs))
@@ -62,7 +63,7 @@ def solve(case: Case) -> Answer:
     began = time.perf_counter()
     bounds = (case.lower / roots, case.upper / roots)
     found = pem(predictor, tuple(data), case.guess / roots, x0=tuple(starts), bounds=bounds, P0=(spread,) * len(data))
-    values = np.asarray(found.x[1] if isinstance(found.x, tuple) else found.x).ravel()[-roots.size :] * roots
+    values = np.asarray(found.p).ravel() * roots
     return Answer(
         values, 0.0, time.perf_counter() - began, bool(found.success), f"{found.nit} iterations, build within"
     )
