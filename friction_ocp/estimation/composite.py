@@ -61,9 +61,6 @@ class Rows:
         """The mean absolute error."""
         return float(np.mean(np.abs(self.errors)))
 
-    def cost(self, loss: Absolute) -> float:
-        return float(np.sum(loss.cost(self.errors))) + self.constant
-
     def curvature(self) -> FloatArray:
         """Return (parameters,) the curvature of a loss as round as the errors are large."""
         return np.sum(self.slope**2, axis=0) / max(self.size, 1e-300) + np.diag(self.hessian)
@@ -85,11 +82,11 @@ class Trial:
     results: tuple[SweepResult, ...]
 
 
-def tried(program: Program, point: Point, loss: Absolute) -> Trial:
+def tried(program: Program, point: Point) -> Trial:
     """Simulate a program without variable start states at a point."""
     results = tuple(program.simulate_trial(point))
     errors = np.concatenate([program.seen_errors(index, result.y) for index, result in enumerate(results)])
-    total = float(np.sum(loss.cost(errors))) + program.parameter_terms(point.theta)[0]
+    total = float(np.sum(program.loss.cost(errors))) + program.parameter_terms(point.theta)[0]
     return Trial(point, errors, total if np.isfinite(total) else np.inf, results)
 
 
@@ -108,14 +105,14 @@ def solve_composite(
     """Minimise a program of the absolute loss without variable start states; the start is moved into the bounds."""
     loss, space, iteration = program.loss, program.space, 0
     assert isinstance(loss, Absolute)
-    now = tried(program, Point(space.clip(start.theta), start.nodes), loss)
+    now = tried(program, Point(space.clip(start.theta), start.nodes))
     if not np.isfinite(now.objective):
         return Solution(now.point, np.inf, 0, False, "the simulation breaks down at the start values")
     rows = linearised(program, now)
     scale, damping, slow = rows.curvature(), FIRST_DAMPING, 0
     while iteration < tolerances.max_iterations:
         step, expected = best_step(space, now.point.theta, rows, loss, damping * scale)
-        trial = tried(program, Point(space.clip(now.point.theta + step), now.point.nodes), loss)
+        trial = tried(program, Point(space.clip(now.point.theta + step), now.point.nodes))
         predicted, gained = now.objective - expected, now.objective - trial.objective
         if predicted <= max(tolerances.decrease * now.objective, tolerances.negligible) and damping <= LONG:
             end = trial if gained > 0 else now

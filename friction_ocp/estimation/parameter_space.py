@@ -170,11 +170,6 @@ def _table(
     return resolved
 
 
-def has_nested(problem: Problem) -> bool:
-    """Whether there is a simpler model to be fitted first: see `nested_space`."""
-    return any(leaf.nested is not None and isinstance(leaf.value, Free) for leaf in drive_leaves(problem.drive))
-
-
 def nested_space(problem: Problem, space: ParameterSpace) -> ParameterSpace:
     """Return the space of the simpler model that is fitted first; the same space where there is none.
 

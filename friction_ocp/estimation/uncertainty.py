@@ -71,15 +71,16 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
     information = found.jacobian.T @ (weight[:, None] * found.jacobian) + found.prior
     bound = space.at_bounds(theta)
     free = ~bound
-    told, untold = inverse_information(information[np.ix_(free, free)])
+    own = np.ix_(free, free)
+    told, untold = inverse_information(information[own])
     covariance = np.full(information.shape, np.nan)
     if white and not absolute:
-        covariance[np.ix_(free, free)] = told + untold
+        covariance[own] = told + untold
         return Uncertainty(covariance, "gauss_newton", bound, np.inf, information)
-    moved = _jackknifed(found, weight, free)
-    count, prior = len(moved), found.prior[np.ix_(free, free)]
+    moved = _jackknifed(found, weight, free, information[own], told)
+    count, prior = len(moved), found.prior[own]
     moved = (moved - moved.mean(axis=0)) * np.sqrt((count - 1) / count)
-    covariance[np.ix_(free, free)] = moved.T @ moved + told @ prior @ told + untold
+    covariance[own] = moved.T @ moved + told @ prior @ told + untold
     return Uncertainty(covariance, "sandwich", bound, float(count - 1), information)
 
 
@@ -106,14 +107,20 @@ def inverse_information(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return (vectors * told) @ vectors.T / scale, (vectors * untold) @ vectors.T / scale
 
 
-def _jackknifed(found: Influence, weight: FloatArray, free: BoolArray) -> FloatArray:
-    """Return (blocks, parameters) how far leaving out each block moves the free parameters, to first order."""
-    slope, prior = found.jacobian[:, free], found.prior[np.ix_(free, free)]
-    own = [(slope[rows], weight[rows], found.score_weight[rows]) for rows in _blocks(found)]
-    parts = [(part.T @ (share[:, None] * part), part.T @ score) for part, share, score in own]
-    whole = sum((part for part, _ in parts), prior)
-    told, _ = inverse_information(whole)
-    return np.array([inverse_information(whole - _leverage_limit(told, part) * part)[0] @ pull for part, pull in parts])
+def _jackknifed(
+    found: Influence, weight: FloatArray, free: BoolArray, information: FloatArray, told: FloatArray
+) -> FloatArray:
+    """Return (blocks, parameters) how far leaving out each block moves the free parameters, to first order.
+
+    `information` is that on the free parameters, `told` its inverse.
+    """
+    moved: list[FloatArray] = []
+    for rows in _blocks(found):
+        slope = found.jacobian[np.ix_(rows, np.flatnonzero(free))]
+        part = slope.T @ (weight[rows, None] * slope)
+        left, _ = inverse_information(information - _leverage_limit(told, part) * part)
+        moved.append(left @ (slope.T @ found.score_weight[rows]))
+    return np.array(moved)
 
 
 def _leverage_limit(told: FloatArray, part: FloatArray) -> float:

@@ -30,10 +30,10 @@ def right_problem(**estimation: Any) -> Problem:
     return fitted_axis(run_of(1), run_of(2), **estimation)
 
 
-def coloured_problem() -> Problem:
+def coloured_problem(runs: int = 2) -> Problem:
     """Return the problem with a slow wander on the encoder that no model explains."""
     uses = []
-    for seed in (1, 2):
+    for seed in range(1, runs + 1):
         recording = run_of(seed)
         channel = recording.channels["position"]
         wander = 0.05 * np.sin(7.0 * channel.time + seed) + 0.03 * np.sin(23.0 * channel.time)

@@ -59,14 +59,16 @@ def test_misfit_scales_the_likelihood_as_it_does_the_standard_error() -> None:
 
 
 def test_a_parameter_at_its_bound_is_one_sided() -> None:
-    """Viscous friction that may not be as small as it is lies on its bound and is excluded above only."""
+    """Viscous friction that may not be as small as it is lies on its bound and is excluded above only.
+
+    The misfit lasts as long as a run: one run alone tells little of how far it moves the parameter.
+    """
     law = CoulombViscous(Free(0.07, 0.0, 2.0), Free(3e-3, 2e-3, 0.03))
-    (item,) = profile(with_law(law, 1), ["motor.friction.viscous"], HERE).items
+    (item,) = profile(with_law(law, *range(1, 9)), ["motor.friction.viscous"], HERE).items
     assert item.parameter.verdict.word == "at_bound"
     assert (item.verdict, item.ends) == ("one_sided", ("bound", "threshold"))
     assert item.interval[0] is None
-    assert item.interval[1] is not None
-    assert 2e-3 < item.interval[1] < 0.03
+    assert item.interval[1] == pytest.approx(2e-3, rel=0.05)
 
 
 def test_a_parameter_that_nothing_depends_on_is_flat() -> None:
