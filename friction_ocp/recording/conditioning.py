@@ -72,7 +72,8 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
 
     Only runs of equal extremes count that are longer than runs elsewhere and are reached and left in full motion, four
     levels of a quantised signal within five samples: neither is the flat top of a quantised sine, nor a rest, which
-    friction may end with a jump. But a commanded plateau looks the same as clipping.
+    friction may end with a jump or from which the signal starts slowly. But a commanded plateau looks the same as
+    clipping.
     """
     y = np.asarray(values, dtype=np.float64)
     y = y[np.isfinite(y)]
@@ -84,7 +85,8 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     starts, stops = _runs(y)
     lengths, outside = stops - starts, ~at_extreme[starts]
     long = ~outside & (lengths > max(2.0, 2.0 * float(np.quantile(lengths[outside], 0.9))))
-    coarse = 4.0 * (detect_resolution(y) or 0.0)
+    level = detect_resolution(y) or 0.0
+    coarse = 4.0 * level
     usual = {
         reach: float(np.median(np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]))
         for reach in range(2, 6)
@@ -94,7 +96,10 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
         reach = min(max((stop - start) // 2, 2), 5)
         # A parabola reached and left with slope s is s n / 4 high over n samples; a quantised one stays within levels.
         height = float(np.nanmean(_moves(y, start, stop, 2))) / 2.0 * (stop - start) / 4.0
-        fast = _moves(y, start, stop, reach) > max(0.25 * usual[reach], coarse)
+        near, far = _moves(y, start, stop, reach), _moves(y, start, stop, 2 * reach)
+        # Twice as long after a rest a signal is four times as far from it; from where it was cut off, less: a parabola.
+        most = 2.0 * (stop - start + 2 * reach) / (stop - start + reach)
+        fast = (near > max(0.25 * usual[reach], coarse)) & ~(far > np.sqrt(4.0 * most) * (near - level))
         if np.any(fast) and height > coarse:
             stuck += stop - start
             ways |= fast | np.array([start == 0, stop == len(y)])

@@ -151,6 +151,14 @@ def test_rest_that_friction_ends_with_a_jump_is_not_clipped() -> None:
     assert not is_clipped(np.round(seen * 2000.0) / 2000.0)
 
 
+def test_ramp_into_a_rest_that_a_fall_ends_is_not_clipped() -> None:
+    """A servo that follows a ramp to its end, and is let go there, stops at once and starts from rest."""
+    ramp, fall = np.linspace(0.0, 1.5, 600), 0.5 * 3e-4 * np.arange(1, 80) ** 2
+    seen = np.concatenate([ramp, np.full(40, 1.5), 1.5 - fall])
+    assert not is_clipped(seen)
+    assert not is_clipped(np.round(seen * 650.0) / 650.0)
+
+
 def test_smooth_motion_of_a_line_is_exact(rng: np.random.Generator) -> None:
     """A line is its own smoothing spline at any cutoff: exact speed, no acceleration."""
     time = times(rng)
