@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
 from friction_ocp.diagnosis.refit import NUDGES, nudged
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
-from friction_ocp.diagnosis.worth import Standard
+from friction_ocp.diagnosis.worth import Standard, innovations
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -198,13 +198,22 @@ def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> Fl
 
 
 def open_bench(problem: Problem, execution: Execution) -> Bench:
-    """Fit the base model in this process, or read its end from the output folder; then try to better it."""
+    """Fit the base model in this process, or read its end from the output folder; then try to better it.
+
+    Not where it leaves no more than noise: there a better fit is looked for when something seems to be missing.
+    """
     workshop, task = Workshop(problem), Task("base", fit_base_model)
     with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
     found = value_of(with_one["base"])
     bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    noise = not innovations(bench.current).significant(level_of(problem))
+    return bench if noise else opened_better(bench, execution)
+
+
+def opened_better(bench: Bench, execution: Execution) -> Bench:
+    """Return the bench of a better fit of the base model, or the same bench where none is found."""
     better = bettered(bench, execution)
-    return replace(better, base_point=better.seat.point)
+    return bench if better is bench else replace(better, base_point=better.seat.point)
 
 
 def bettered(bench: Bench, execution: Execution) -> Bench:

@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
-from friction_ocp.diagnosis.reading import explains_more, other_reading, read_otherwise
+from friction_ocp.diagnosis.reading import explains_more, other_readings, read_otherwise
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
@@ -138,15 +138,18 @@ def diagnose(
     Where the inputs, read the other way between their samples, leave nothing with fewer additions, or where something
     was left, that is how they are read.
     """
-    stated, other = _diagnosed(problem, tell, execution), other_reading(problem)
-    if other is None or not stated.gap:
+    stated = _diagnosed(problem, tell, execution)
+    if not stated.gap:
         return stated
     tell("the inputs read the other way", 0.0)
-    base = read_otherwise(other, stated.base)
-    if not base.holds or not explains_more(base, stated.final, stated.accepted, stated.left_over):
+    others = [(other, read_otherwise(other, stated.base)) for other in other_readings(problem)]
+    final, accepted, left = stated.final, stated.accepted, stated.left_over
+    able = [(other, base) for other, base in others if base.holds and explains_more(base, final, accepted, left)]
+    if not able:
         return stated
+    other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)
     read = _diagnosed(other, tell, execution)
-    simpler = not read.left_over and (stated.left_over or len(read.accepted) < len(stated.accepted))
+    simpler = not read.left_over and (left or len(read.accepted) < len(accepted))
     return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
 
 
@@ -161,11 +164,9 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
         run = replace(execution, executor=executor)
-        bench = open_bench(problem, run)
-        base = bench.base
-        search = Search(bench, run, meant, level, tell, patience)
+        search = Search(open_bench(problem, run), run, meant, level, tell, patience)
         search.go()
-    rounds, accepted = search.rounds, search.accepted
+    base, rounds, accepted = search.bench.base, search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]

@@ -24,14 +24,18 @@ from friction_ocp.estimation.problem import Problem
 _DRIVING = ("current", "current_command", "torque", "voltage")
 
 
-def other_reading(problem: Problem) -> Problem | None:
-    """Return the problem with the inputs of its motors read the other way; None where there are none."""
-    drive = problem.drive
-    read = {item.name: _turned(item) for item in drive.inputs if item.signal in _DRIVING}
-    if not read:
-        return None
-    channels = tuple(read.get(item.name, item) for item in drive.channels)
-    return replace(problem, drive=replace(drive, channels=channels))
+def other_readings(problem: Problem) -> list[Problem]:
+    """Return the problem with the inputs of its motors read the other way, and with its set points, as far as it has
+    them."""
+    inputs = problem.drive.inputs
+    ways = [[item for item in inputs if item.signal in _DRIVING], [item for item in inputs if item.part == "reference"]]
+    return [_read(problem, [_turned(item) for item in way]) for way in ways if way]
+
+
+def _read(problem: Problem, turned: Sequence[Channel]) -> Problem:
+    read = {item.name: item for item in turned}
+    channels = tuple(read.get(item.name, item) for item in problem.drive.channels)
+    return replace(problem, drive=replace(problem.drive, channels=channels))
 
 
 def _turned(channel: Channel) -> Channel:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Bench, Tell, bettered
+from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, left_out_errors
@@ -104,6 +104,8 @@ class Search:
         """Add until noise is left, nothing helps or the rounds are used up."""
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
+            if not self.rounds and self._seems_missing(done) and self._better_base():
+                done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
                 done = self._elsewhere() or done
             self.rounds.append(done)
@@ -122,6 +124,16 @@ class Search:
         if self.accepted and not self._helps():
             self.taken_back += [item for item in self.rounds if item.accepted is not None]
             self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
+
+    def _seems_missing(self, first: Round) -> bool:
+        """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
+        noise = not first.excess.significant(self.level)
+        return noise and (bool(first.choice.rivals) or significant(self.bench.slow, self.level))
+
+    def _better_base(self) -> bool:
+        """Look for a better fit of the base model; whether there is one."""
+        known, self.bench = self.bench, opened_better(self.bench, self.run)
+        return self.bench is not known
 
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""

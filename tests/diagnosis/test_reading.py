@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from diagnosis_cases import axis, write_case
+import yaml
+from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, OFF, TORQUE_CONSTANT, VISCOUS, axis, write_case
+from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.recording.recording import Channel, Recording
+
+TICK, LOGGED, SECONDS, STIFFNESS = 1e-3, 0.01, 4.0, 3.0
 
 
 def found(folder: Path, **friction: object) -> Diagnosis:
@@ -30,3 +37,53 @@ def test_a_held_input_is_no_delay(tmp_path: Path) -> None:
 def test_an_effect_is_found_beside_it(tmp_path: Path) -> None:
     """What the drive has is named, and no delay with it."""
     assert found(tmp_path, law="stribeck", tau_s=0.15, omega_s=6.0).accepted == (("stribeck", "motor"),)
+
+
+def servo(folder: Path) -> Path:
+    """Write runs of a servo that is told its goal once a log line, and a file that does not say that it is held."""
+    law = PlantFriction(law="coulomb_viscous", tau_c=COULOMB, viscous=30.0 * VISCOUS)
+    plant = Plant(
+        shafts=(PlantShaft("motor", INERTIA, law),),
+        motors=(PlantMotor("motor", "motor", torque_constant=TORQUE_CONSTANT, controller="loop"),),
+        controllers=(PlantController("loop", "p", "position", kp=STIFFNESS, sample_time=TICK),),
+        sensors=(
+            PlantSensor("position", "motor.theta", period=TICK, resolution=ENCODER_STEP),
+            PlantSensor("shown", "motor.theta", period=LOGGED, resolution=ENCODER_STEP),
+        ),
+    )
+    for k, name in enumerate("abc"):
+        rng = np.random.default_rng(k)
+        time, phase = np.arange(0.0, SECONDS, LOGGED), rng.uniform(0.0, 2.0 * np.pi, 3)
+        goal = 4.0 * np.sin((1.0 + 0.3 * k) * time**1.5 + phase[0]) - 4.0 * np.sin(phase[0])
+        run = plant.simulate(SECONDS, {"reference.theta": Trajectory(time, goal, "zero")}, rng)
+        stamps, shown = (values[: time.size] for values in run.channels["shown"])
+        np.testing.assert_allclose(stamps, time, atol=1e-9)
+        channels = {name: Channel(name, time, values, "rad") for name, values in (("position", shown), ("goal", goal))}
+        write_recording(Recording(name, channels), folder / f"{name}.h5")
+    friction = {"law": "coulomb_viscous", "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2}}
+    friction["viscous"] = {"guess": 30.0 * OFF * VISCOUS, "min": 0, "max": 1}
+    inertia = {"guess": OFF * INERTIA, "min": 1e-4, "max": 0.1}
+    document = {
+        "format": "friction-ocp-problem/1",
+        "drive": {
+            "motor": {"torque_constant": TORQUE_CONSTANT},
+            "shafts": [{"name": "motor", "inertia": inertia, "friction": friction}],
+        },
+        "controller": {"type": "p", "feedback": "position", "kp": STIFFNESS, "sample_time": TICK, "output": "current"},
+        "channels": {
+            "goal": {"measures": "reference.theta", "role": "input"},
+            "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
+        },
+        "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
+        "diagnosis": {"effects": ["stribeck", "drive_lag", "sensor_delay", "quadratic_drag"]},
+    }
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def test_a_held_goal_is_no_lag(tmp_path: Path) -> None:
+    """A servo that follows its goal in steps has no lag that its model lacks."""
+    seen = diagnose(load_problem(servo(tmp_path)))
+    assert seen.verdict == "no_gap"
+    assert any(text.startswith("goal: is held") for text in diagnosis_document(seen)["assumptions"])
