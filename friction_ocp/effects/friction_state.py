@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
-from friction_ocp.effects.friction_curve import is_dry
+from friction_ocp.effects.friction_curve import is_dry, stribeck_speeds
 from friction_ocp.friction.composite import Bristle, with_bristle
 from friction_ocp.friction.element import LoadDependence
 from friction_ocp.parameters import Free
@@ -98,11 +98,20 @@ class LoadDependenceEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: LOADED},)),))
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        """Return the drive whose drag grows with the torque, too."""
-        friction, path = drive.shaft(place).friction, f"{place}.friction.load.viscous"
-        if friction.load is None or friction.load.viscous != 0.0:
+        """Return the drive whose drag grows with the torque, too, or whose loaded friction falls with the speed.
+
+        Source: Duclusaud et al. 2025, the load-dependent Stribeck friction of geared servos.
+        """
+        friction, path = drive.shaft(place).friction, f"{place}.friction.load"
+        if friction.load is None or friction.load.viscous != 0.0 or friction.load.stribeck != 0.0:
             return None
-        drag = LOADED / clues.typical_speed(place)
-        load = replace(friction.load, viscous=Free(drag, 0.0, MOST * drag))
+        speed = clues.typical_speed(place)
+        drag, speeds = LOADED / speed, stribeck_speeds(clues, place)
+        guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
+        falling, growing = Free(LOADED, 0.0, MOST * LOADED), Free(drag, 0.0, MOST * drag)
+        load = replace(friction.load, viscous=growing, stribeck=falling, omega_s=guess)
         added = change_shaft(drive, place, friction=replace(friction, load=load))
-        return Augmentation(added, {path: 0.0}, (Trial(({path: drag},)),))
+        off = {f"{path}.viscous": 0.0, f"{path}.stribeck": 0.0}
+        trials = [Trial(({f"{path}.viscous": drag},))]
+        trials += [Trial(({f"{path}.stribeck": LOADED},), {f"{path}.omega_s": omega_s}) for omega_s in speeds]
+        return Augmentation(added, off, tuple(trials))

@@ -7,7 +7,7 @@ the form in which the integrator solves for the new speed in closed form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -17,8 +17,11 @@ from friction_ocp.friction.law import AbstractFrictionLaw, Direction, times
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip, Play
 from friction_ocp.friction.modifiers import Ripple, Surroundings, WarmUp
 from friction_ocp.friction.smoothing import decay_means, positive_part, smooth_abs, smooth_sign, where
-from friction_ocp.friction.static import NoFriction
+from friction_ocp.friction.static import NoFriction, stribeck_share
 from friction_ocp.parameters import Directional, Value, inline, quantity
+
+EXPONENT = 2.0
+"""Of Stribeck friction that grows with the load at a speed of its own."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +34,13 @@ class LoadDependence:
     coulomb: Value = quantity("dimensionless", "Coulomb friction per transmitted torque", 0.0)
     stribeck: Value = quantity("dimensionless", "Stribeck friction per transmitted torque", 0.0, nested=0.0)
     viscous: Value = quantity("load_viscous", "viscous friction per transmitted torque", 0.0)
+    omega_s: Value = quantity("speed", "Stribeck speed of what grows with the torque", None, nested="guess")
+    """None is that of the law, with its exponent; beside a speed of its own the exponent is 2."""
 
     def scaled(self, level: Any, viscous: Any) -> LoadDependence:
         """Return the shares with those of dry friction times `level` and that of the drag times `viscous`."""
         factors = {"coulomb": level, "stribeck": level, "viscous": viscous}
-        return LoadDependence(**{name: times(getattr(self, name), factor) for name, factor in factors.items()})
+        return replace(self, **{name: times(getattr(self, name), factor) for name, factor in factors.items()})
 
     def along(self, direction: Direction) -> LoadDependence:
         """Return the shares of one direction of motion."""
@@ -43,7 +48,12 @@ class LoadDependence:
         def pick(value: Value) -> Value:
             return getattr(value, direction) if isinstance(value, Directional) else value
 
-        return LoadDependence(pick(self.coulomb), pick(self.stribeck), pick(self.viscous))
+        return LoadDependence(pick(self.coulomb), pick(self.stribeck), pick(self.viscous), pick(self.omega_s))
+
+    def share(self, law: AbstractFrictionLaw, speed: Any) -> Any:
+        """Return dry friction per transmitted torque at `speed` >= 0, on a shaft with a law."""
+        falling = law.weakening(speed) if self.omega_s is None else stribeck_share(speed, self.omega_s, EXPONENT)
+        return self.coulomb + self.stribeck * falling
 
 
 def _stacked(items: list[Any]) -> ca.SX:
@@ -92,7 +102,7 @@ class FrictionElement:
         if self.load is None:
             return 0.0
         load, law = self.load.along(direction), self.law.along(direction)
-        share = load.coulomb + load.stribeck * law.weakening(speed)
+        share = load.share(law, speed)
         return transmitted * (share + load.viscous * speed if with_viscous else share)
 
     def torque(self, omega: Any, transmitted: Any = 0.0, width: Any = 0.0) -> Any:

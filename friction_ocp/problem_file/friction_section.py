@@ -25,6 +25,7 @@ class LoadSection(Section):
     coulomb: FrictionNumber = 0.0
     stribeck: FrictionNumber = 0.0
     viscous: FrictionNumber = 0.0
+    omega_s: FrictionNumber = None
 
     def build(self) -> LoadDependence:
         return LoadDependence(**given(self, *type(self).model_fields))

@@ -70,3 +70,16 @@ def test_what_the_plant_has_is_named(name: str, tmp_path: Path) -> None:
     path = write_case(tmp_path, plant(), effects=[name, *rivals])
     found = diagnose(load_problem(path))
     assert found.accepted[:1] == ((name, place),)
+
+
+@pytest.mark.slow
+def test_loaded_friction_that_falls_with_the_speed_gets_that_shape(tmp_path: Path) -> None:
+    """A share of the load that fades with the speed is named as load dependence, and its size and speed are found."""
+    share, speed = 0.3, 15.0
+    loads = {"load_coulomb": share / 3.0, "load_stribeck": share}
+    falling = PlantFriction("stribeck", COULOMB, COULOMB, speed, viscous=VISCOUS, **loads)
+    path = write_case(tmp_path, shaft(friction=falling)(), effects=["load_dependence", "stribeck", "quadratic_drag"])
+    found = diagnose(load_problem(path))
+    assert found.accepted == (("load_dependence", "motor"),)
+    assert found.final.values["motor.friction.load.stribeck"] == pytest.approx(share, rel=0.1)
+    assert found.final.values["motor.friction.load.omega_s"] == pytest.approx(speed, rel=0.1)

@@ -11,7 +11,7 @@ from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, Motor, Shaf
 from friction_ocp.drive.stepping import stepped
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.friction.element import FrictionElement, LoadDependence
-from friction_ocp.friction.static import Coulomb
+from friction_ocp.friction.static import Coulomb, CoulombViscous, Stribeck
 
 STEP_ERROR = 1e-3
 """Relative error of steps of 1 ms with a dozen stops, joints of up to 300 rad/s and bristles."""
@@ -153,3 +153,13 @@ def test_a_shaft_with_two_branches_carries_both_torques(stiffness: float) -> Non
     truth, _ = twin.run(1.0)
     finer = twin.bench.run(1.0, {"drive.current": reversals()}, step=2.5e-4)
     assert worst(truth, finer, "motor.theta", "motor.omega") < STEP_ERROR
+
+
+def test_a_stribeck_speed_of_the_load_is_that_of_a_law() -> None:
+    """Loaded friction that falls with a speed of its own is that of a law with this speed and no rise of its own."""
+    shares = (0.1, 0.05, 0.005)
+    own = FrictionElement(CoulombViscous(0.1, 0.01), LoadDependence(*shares, omega_s=2.0))
+    of_law = FrictionElement(Stribeck(0.1, 0.1, 2.0, 0.01), LoadDependence(*shares))
+    for speed in np.linspace(0.0, 10.0, 21):
+        wanted = float(of_law.magnitude("positive", float(speed), 3.0))
+        assert float(own.magnitude("positive", float(speed), 3.0)) == pytest.approx(wanted, rel=ROUNDING)

@@ -123,11 +123,12 @@ def load_stribeck_has_a_speed(case: Case) -> Iterator[Finding]:
     """A Stribeck part that grows with load needs a law with a Stribeck speed."""
     for k, shaft in enumerate(case.drive.shafts):
         load, law = shaft.friction.load, type(shaft.friction.law)
-        if load is not None and load.stribeck != 0.0 and law.weakening is AbstractFrictionLaw.weakening:
+        if load is None or load.omega_s is not None or load.stribeck == 0.0:
+            continue
+        if law.weakening is AbstractFrictionLaw.weakening:
             what = f"law '{law.name}' has no Stribeck speed for load.stribeck"
-            yield Finding(
-                case.at(f"drive.shafts[{k}].friction.load.stribeck"), what, "laws with omega_s: stribeck, lugre"
-            )
+            allowed = "load.omega_s, or laws with omega_s: stribeck, lugre"
+            yield Finding(case.at(f"drive.shafts[{k}].friction.load.stribeck"), what, allowed)
 
 
 def ties_can_be_computed(case: Case) -> Iterator[Finding]:
