@@ -200,7 +200,8 @@ def _shaft_losses(shaft: Shaft, chosen: Shaft) -> Iterator[Loss]:
     for key in ("load", "ripple", "warm_up"):
         term = getattr(shaft.friction, key)
         if term is not None:
-            numbers = ", ".join(f"{item.name} = {_shown(getattr(term, item.name))}" for item in fields(term))
+            known = {item.name: getattr(term, item.name) for item in fields(term)}
+            numbers = ", ".join(f"{key} = {_shown(value)}" for key, value in known.items() if value is not None)
             yield Loss(f"{shaft.name}.friction.{key} ({numbers})", "left out")
     if shaft.disturbance is not None:
         yield Loss(f"{shaft.name}.disturbance", "left out")
