@@ -53,10 +53,11 @@ def is_dry(shaft: Shaft) -> bool:
     return not isinstance(plain_law(shaft.friction.law), (NoFriction, Viscous))
 
 
-def stribeck_speeds(clues: Clues, place: str) -> list[float]:
-    """Return the speeds at which friction that falls with the speed is tried, in rising order."""
+def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
+    """Return the free Stribeck speed of friction that falls with the speed, and where it is tried, in rising order."""
     speed = clues.typical_speed(place)
-    return sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
+    tried = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
+    return Free(tried[len(tried) // 2], 1e-2 * tried[0], 3.0 * speed), tried
 
 
 class StribeckEffect(AbstractEffect):
@@ -74,9 +75,7 @@ class StribeckEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         path, size = f"{place}.friction.added.stribeck", SHARE * clues.typical_torque[place]
-        speed = clues.typical_speed(place)
-        speeds = stribeck_speeds(clues, place)
-        guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
+        guess, speeds = stribeck_speed(clues, place)
         rise = StribeckRise(upwards(size), guess, EXPONENT)
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.omega_s": omega_s}) for omega_s in speeds)
         added = with_friction(drive, drive.shaft(place), stribeck=rise)

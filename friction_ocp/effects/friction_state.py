@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
-from friction_ocp.effects.friction_curve import is_dry, stribeck_speeds
+from friction_ocp.effects.friction_curve import is_dry, stribeck_speed
 from friction_ocp.friction.composite import Bristle, with_bristle
 from friction_ocp.friction.element import LoadDependence
 from friction_ocp.parameters import Free
@@ -105,9 +105,7 @@ class LoadDependenceEffect(AbstractEffect):
         friction, path = drive.shaft(place).friction, f"{place}.friction.load"
         if friction.load is None or friction.load.viscous != 0.0 or friction.load.stribeck != 0.0:
             return None
-        speed = clues.typical_speed(place)
-        drag, speeds = LOADED / speed, stribeck_speeds(clues, place)
-        guess = Free(speeds[len(speeds) // 2], 1e-2 * speeds[0], 3.0 * speed)
+        drag, (guess, speeds) = LOADED / clues.typical_speed(place), stribeck_speed(clues, place)
         falling, growing = Free(LOADED, 0.0, MOST * LOADED), Free(drag, 0.0, MOST * drag)
         load = replace(friction.load, viscous=growing, stribeck=falling, omega_s=guess)
         added = change_shaft(drive, place, friction=replace(friction, load=load))

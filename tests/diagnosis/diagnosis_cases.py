@@ -45,6 +45,20 @@ def record(plant: Plant, name: str, seed: int) -> Recording:
     return Recording(name, {key: Channel(key, *run.channels[key], units[key]) for key in units})
 
 
+def plain_drive(viscous: float) -> dict[str, Any]:
+    """Return the drive section of a model with Coulomb and viscous friction alone, its guesses a little off."""
+    friction = {
+        "law": "coulomb_viscous",
+        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
+        "viscous": {"guess": OFF * viscous, "min": 0, "max": 0.1},
+    }
+    inertia = {"guess": OFF * INERTIA, "min": 1e-4, "max": 0.1}
+    return {
+        "motor": {"torque_constant": TORQUE_CONSTANT},
+        "shafts": [{"name": "motor", "inertia": inertia, "friction": friction}],
+    }
+
+
 EFFECTS = ("stribeck", "quadratic_drag", "asymmetry", "unbalance", "sensor_delay")
 """That compete in a problem unless another catalogue is asked for."""
 
@@ -53,18 +67,9 @@ def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str]
     """Write three recordings and a problem whose model has Coulomb and viscous friction alone."""
     for k, name in enumerate("abc"):
         write_recording(record(plant, name, 10 * seed + k), folder / f"{name}.h5")
-    friction = {
-        "law": "coulomb_viscous",
-        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
-        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
-    }
-    inertia = {"guess": OFF * INERTIA, "min": 1e-4, "max": 0.1}
     document = {
         "format": "friction-ocp-problem/1",
-        "drive": {
-            "motor": {"torque_constant": TORQUE_CONSTANT},
-            "shafts": [{"name": "motor", "inertia": inertia, "friction": friction}],
-        },
+        "drive": plain_drive(VISCOUS),
         "channels": {
             "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": CURRENT_NOISE},
             "position": {"measures": "motor.theta", "resolution": plant.sensors[0].resolution},

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, OFF, TORQUE_CONSTANT, VISCOUS, axis, write_case
+from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, plain_drive, write_case
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
@@ -17,6 +17,7 @@ from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
 TICK, LOGGED, SECONDS, STIFFNESS = 1e-3, 0.01, 4.0, 3.0
+DAMPED = 30.0 * VISCOUS
 
 
 def found(folder: Path, **friction: object) -> Diagnosis:
@@ -41,7 +42,7 @@ def test_an_effect_is_found_beside_it(tmp_path: Path) -> None:
 
 def servo(folder: Path) -> Path:
     """Write runs of a servo that is told its goal once a log line, and a file that does not say that it is held."""
-    law = PlantFriction(law="coulomb_viscous", tau_c=COULOMB, viscous=30.0 * VISCOUS)
+    law = PlantFriction(law="coulomb_viscous", tau_c=COULOMB, viscous=DAMPED)
     plant = Plant(
         shafts=(PlantShaft("motor", INERTIA, law),),
         motors=(PlantMotor("motor", "motor", torque_constant=TORQUE_CONSTANT, controller="loop"),),
@@ -60,15 +61,9 @@ def servo(folder: Path) -> Path:
         np.testing.assert_allclose(stamps, time, atol=1e-9)
         channels = {name: Channel(name, time, values, "rad") for name, values in (("position", shown), ("goal", goal))}
         write_recording(Recording(name, channels), folder / f"{name}.h5")
-    friction = {"law": "coulomb_viscous", "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2}}
-    friction["viscous"] = {"guess": 30.0 * OFF * VISCOUS, "min": 0, "max": 1}
-    inertia = {"guess": OFF * INERTIA, "min": 1e-4, "max": 0.1}
     document = {
         "format": "friction-ocp-problem/1",
-        "drive": {
-            "motor": {"torque_constant": TORQUE_CONSTANT},
-            "shafts": [{"name": "motor", "inertia": inertia, "friction": friction}],
-        },
+        "drive": plain_drive(DAMPED),
         "controller": {"type": "p", "feedback": "position", "kp": STIFFNESS, "sample_time": TICK, "output": "current"},
         "channels": {
             "goal": {"measures": "reference.theta", "role": "input"},
