@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
-from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, quick_refit
+from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, fitted_loosely, quick_refit
 from friction_ocp.diagnosis.rival import Rival, Standing
 from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.diagnosis.worth import Key
@@ -69,6 +69,14 @@ class Crew:
         """
         tasks = [self._task("loose", key, screen_loose, key) for key in candidates]
         return self._tested("screening on loosely joined segments", tasks, 0.25)
+
+    def fitted_loosely(self, candidates: Sequence[Screened]) -> list[float]:
+        """Return by how much candidates, fitted on loosely joined segments, better the objective of these.
+
+        Minus infinity where the simulation breaks down.
+        """
+        tasks = [self._task("fit-loose", item.key, fit_loose, (screened_document(item),)) for item in candidates]
+        return [float(restored(value)) for value in self._run("fits on loosely joined segments", tasks, 0.4)]
 
     def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
         found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
@@ -160,6 +168,18 @@ def screen_unfitted(bench: Bench, effect: str, place: str) -> Json:
 def screen_loose(bench: Bench, effect: str, place: str) -> Json:
     """Test an effect at a place on loosely joined segments; null where there are none."""
     return _tested(bench, bench.loose, effect, place)
+
+
+def fit_loose(bench: Bench, content: Json) -> Json:
+    """Return the decrease of the objective of loosely joined segments that a candidate brings, fitted there.
+
+    Zero where there are none.
+    """
+    if bench.loose is None:
+        return 0.0
+    fitted = fitted_loosely(bench.loose, restored_screened(bench, content))
+    known = bench.loose.linear
+    return plain(known.program.objective(known.point) - fitted if np.isfinite(fitted) else -np.inf)
 
 
 def _tested(bench: Bench, start: FittedModel | None, effect: str, place: str) -> Json:

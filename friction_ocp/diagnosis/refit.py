@@ -10,7 +10,7 @@ from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.easing import eased
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
-from friction_ocp.diagnosis.polishing import QUICK, loosely, polished, timed
+from friction_ocp.diagnosis.polishing import QUICK, loosely, loosely_joined, polished, timed
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import Model, with_drive
@@ -55,6 +55,14 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     return min(ends, key=lambda fitted: fitted.objective)
 
 
+def fitted_loosely(loose: FittedModel, item: Screened) -> float:
+    """Return the objective of a candidate on loosely joined segments, fitted from where its first start is."""
+    model = with_drive(loose.model, item.augmentation.drive)
+    values = {**loose.values, **item.starts[0].added(item.augmentation.off)}
+    program, point = loosely_joined(model, [model.space.clip(model.space.with_known(values))])
+    return program.objective(point)
+
+
 def begun_at_size(base: FittedModel, item: Screened, scale: float) -> FittedModel:
     """Fit a candidate, a few steps from a multiple of its predicted size, all else as it was."""
     drive = item.augmentation.drive
@@ -90,12 +98,11 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
     """Continue a refit to its end, around the kinks of exact friction that catch it.
 
-    One of segments that is still far from the recordings there lacks more than better nodes give back: unless the refit
-    is to be `thorough` it is not freed until it is accepted, which most of those are not.
+    One that is still far from the recordings there lacks more than a way around kinks gives back: unless the refit is
+    of segments and to be `thorough` it is not freed until it is accepted, which most of those are not.
     """
     ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
-    enough = ended.astray and fitted.footing.segment_s is not None and not thorough
-    return ended if enough else freed(ended)
+    return ended if ended.lost or (ended.astray and not thorough) else freed(ended)
 
 
 def nudged(fitted: FittedModel, seed: int) -> FittedModel:

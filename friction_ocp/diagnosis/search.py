@@ -48,7 +48,8 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
 joined segments, and, whatever they promise, for those of free runs that are lost."""
 NOTABLE = 0.05
-"""Share of what is left by which another fit of the same model must be better to look for effects anew."""
+"""Share of what is left by which another fit of the same model must be better to look for effects anew. What leaves no
+more than that beside the best completed refit, after a few steps, is completed, too."""
 MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
@@ -216,7 +217,7 @@ class Search:
         bench, keys = self.bench.at(fitted), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
         self.bench = bench.at(current)
-        if innovations(current).significant(self.level):
+        if innovations(current).significant(self.level) and not self._exhausted():
             self._exchange()
 
     def _exchange(self) -> None:
@@ -313,14 +314,23 @@ def to_refit(
     """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
 
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
-    share of the largest promise that is: neither prediction tells for certain what is worth little.
+    share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
+    joined segments do.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if chosen and current.lost:
         first = [item for item in chosen if item.starts][:BEGUN]
-        return with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found), []
+        tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
+        return _leading(tried, crew.fitted_loosely(tried)), []
     unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
     return with_resembling(chosen, found, current.astray), unfitted
+
+
+def _leading(tried: Sequence[Screened], gains: Sequence[float]) -> list[Screened]:
+    """Return candidates that gain a notable share of the most where segments are loosely joined, two at least."""
+    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    enough = MOST_ALIKE * gains[order[0]]
+    return [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
 
 
 def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
@@ -354,6 +364,7 @@ def completed_rivals(
 ) -> Iterator[list[Rival]]:
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
+    What lost free runs promise is no prediction, and nothing is made thorough that is far behind there.
     What fits best where it was fitted may be worth nothing on recordings left out. Where it gains what is `asked` of it
     and yet will not do, it may have come to rest on the way: at last the best of those begin at other sizes. The first
     are completed in any case, further ones as long as the search is not `exhausted`.
@@ -367,12 +378,20 @@ def completed_rivals(
     current = crew.bench.current
     noise = 0.5 * samples(current)
     hopes = [min(refit.cost, max(current.cost - refit.screened.gain, noise)) for refit in refits]
-    count = max(FINISHED, sum(hope < CLOSE * min(hopes) for hope in hopes))
+    if current.lost:
+        hopes = [refit.cost for refit in refits]
+    close = sum(hope < CLOSE * min(hopes) for hope in hopes)
+    count, thorough = max(FINISHED, close), min(FINISHED, close) if current.lost else FINISHED
     order = sorted(range(len(hopes)), key=lambda k: (hopes[k], refits[k].cost))
     alike = effects()[refits[order[0]].key[0]].resembles
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
-    rivals = crew.rivals([refits[k] for k in first], without, asked, FINISHED)
+    rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
+    reached = noise + (1.0 + NOTABLE) * max(min(item.standing.cost for item in rivals) - noise, 0.0)
+    near = [k for k in others if refits[k].cost < reached]
+    if near:
+        others = [k for k in others if k not in near]
+        rivals = [*rivals, *crew.rivals([refits[k] for k in near], without, asked)]
     yield rivals
     if others and exhausted():
         return

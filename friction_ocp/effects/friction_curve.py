@@ -34,6 +34,10 @@ EXPONENT = 2.0
 takes 1, Armstrong-Helouvry 1991 takes 2."""
 
 
+TAIL = 0.3
+"""Tail of a Stribeck curve that is tried, a third of Hess & Soom's."""
+
+
 def with_friction(drive: Drive, shaft: Shaft, **terms: Any) -> Drive:
     """Return the drive with terms added to the friction of a shaft."""
     element = shaft.friction
@@ -90,12 +94,21 @@ class StribeckEffect(AbstractEffect):
         return Hiding(added, f"{path}.torque", f"{path}.omega_s", tried, level)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        terms, path = added_terms(drive.shaft(place).friction.law), f"{place}.friction.added.stribeck.delta"
-        if terms is None or terms.stribeck is None or terms.stribeck.delta != EXPONENT:
+        """Return the drive with another exponent or, if it has one already, with friction that goes on falling.
+
+        Source: Hess & Soom 1990, whose curve ends like a power of the speed.
+        """
+        terms, path = added_terms(drive.shaft(place).friction.law), f"{place}.friction.added.stribeck"
+        if terms is None or terms.stribeck is None or terms.stribeck.tail is not None:
             return None
-        rise = replace(terms.stribeck, delta=Free(EXPONENT, 0.3, 6.0))
+        if terms.stribeck.delta == EXPONENT:
+            name, off, on = "delta", EXPONENT, 0.9 * EXPONENT
+            rise = replace(terms.stribeck, delta=Free(EXPONENT, 0.3, 6.0))
+        else:
+            name, off, on = "tail", 0.0, TAIL
+            rise = replace(terms.stribeck, tail=Free(0.0, 0.0, 10.0 * TAIL))
         added = with_friction(drive, drive.shaft(place), stribeck=rise)
-        return Augmentation(added, {path: EXPONENT}, (Trial(({path: 0.9 * EXPONENT},)),))
+        return Augmentation(added, {f"{path}.{name}": off}, (Trial(({f"{path}.{name}": on},)),))
 
 
 class PolylineBreakEffect(AbstractEffect):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -40,22 +40,45 @@ def wave(
     return kind(amplitude, amplitude, period), dict.fromkeys(paths, 0.0), trials
 
 
-OVERTONE = 0.1
-"""Size of a trial overtone over the wave's own."""
+FURTHER = 0.1
+"""Size of a trial overtone, or of a wave of another period, over the wave's own."""
+SAME_PERIOD = 0.1
+"""Relative difference up to which a period of what is missing is taken for that of the wave, or of an overtone."""
 
 
 def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
-    cosine, sine = (clues.numbers.get(f"{path}.{name}", start_of(getattr(part, name))) for name in ("cosine", "sine"))
-    size = OVERTONE * float(np.hypot(cosine, sine)) or OVERTONE
+    size = _further_size(part, path, clues)
     names = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
     paths = [f"{path}.{name}" for name in names]
     trial = Trial(tuple({name: size} for name in paths))
     return replace(part, **dict.fromkeys(names, either_way(size))), dict.fromkeys(paths, 0.0), (trial,)
 
 
+def other_wave(
+    kind: type[Any], part: Any, path: str, clues: Clues, periods: list[float]
+) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
+    """Return a wave with a free one of another period beside it, off values and a trial for each period."""
+    plain, off, trials = wave(kind, f"{path}.other", _further_size(part, path, clues), periods)
+
+    def named(values: Mapping[str, float]) -> dict[str, float]:
+        return {name.replace(f"{path}.other.", f"{path}.other_"): value for name, value in values.items()}
+
+    added = replace(part, other_cosine=plain.cosine, other_sine=plain.sine, other_period=plain.period)
+    turned = tuple(Trial(tuple(map(named, item.amplitudes)), named(item.fixed)) for item in trials)
+    return added, named(off), turned
+
+
+def _further_size(part: Any, path: str, clues: Clues) -> float:
+    cosine, sine = (clues.numbers.get(f"{path}.{name}", start_of(getattr(part, name))) for name in ("cosine", "sine"))
+    return FURTHER * float(np.hypot(cosine, sine)) or FURTHER
+
+
 class AbstractWaveEffect(AbstractEffect):
-    """A wave that a part of the drive lacks, with overtones once one with a single period was accepted."""
+    """A wave that a part of the drive lacks; once one was accepted, with overtones or a wave of another period.
+
+    Which of both comes first, the strongest period of what is still missing says.
+    """
 
     kind: ClassVar[type[Wave]]
 
@@ -77,9 +100,18 @@ class AbstractWaveEffect(AbstractEffect):
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         plain, path = self.there(drive, place)
-        if plain is None or plain.has_overtones:
+        if plain is None or (plain.has_overtones and plain.has_other):
             return None
-        part, off, trials = overtones(plain, path, clues)
+        period = clues.numbers.get(f"{path}.period", start_of(plain.period))
+        known = [period / order for order in (1, 2, 3)]
+        found = [] if plain.has_other else self.size_and_periods(drive, place, clues)[1]
+        strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
+        if not plain.has_overtones and (not strange or strange[0] != found[0]):
+            part, off, trials = overtones(plain, path, clues)
+        elif strange:
+            part, off, trials = other_wave(self.kind, plain, path, clues, strange)
+        else:
+            return None
         return Augmentation(self.with_wave(drive, place, part), off, trials)
 
 

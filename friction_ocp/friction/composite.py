@@ -14,15 +14,22 @@ from friction_ocp.parameters import Value, inline, quantity
 
 @dataclass(frozen=True)
 class StribeckRise:
-    """Extra friction near standstill: torque exp(-(speed / omega_s)^delta)."""
+    r"""Extra friction near standstill, which falls as an exponential or, with a tail, as slowly as a power.
+
+    .. math:: \text{torque} \, (1 + \text{tail} \, s)^{-1 / \text{tail}}, \quad s = (|\omega| / \omega_s)^\delta
+
+    Without a tail that is :math:`\text{torque} \, e^{-s}`; with a tail of 1 and an exponent of 2 it is the curve of
+    Hess & Soom 1990.
+    """
 
     torque: Value = quantity("torque", "extra friction at standstill", nested=0.0)
     omega_s: Value = quantity("speed", "Stribeck speed", nested="guess")
     delta: Value = quantity("dimensionless", "Stribeck exponent", 2.0, nested="guess")
+    tail: Value = quantity("dimensionless", "how slowly the Stribeck curve ends", None, nested="guess")
 
     def torque_at(self, speed: Any) -> Any:
         """Return the torque at `speed` >= 0."""
-        return self.torque * stribeck_share(speed, self.omega_s, self.delta)
+        return self.torque * stribeck_share(speed, self.omega_s, self.delta, self.tail)
 
 
 @dataclass(frozen=True)

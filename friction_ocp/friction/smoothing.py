@@ -31,6 +31,11 @@ def sqrt(value: Any) -> Any:
     return ca.sqrt(value) if isinstance(value, ca.SX) else np.sqrt(value)
 
 
+def log(value: Any) -> Any:
+    """Natural logarithm."""
+    return ca.log(value) if isinstance(value, ca.SX) else np.log(value)
+
+
 def sin(value: Any) -> Any:
     """Sine."""
     return ca.sin(value) if isinstance(value, ca.SX) else np.sin(value)
@@ -83,7 +88,7 @@ def positive_part(value: Any) -> Any:
 
 def power(base: Any, exponent: Any) -> Any:
     """base**exponent for base >= 0 with finite derivatives at base = 0."""
-    logarithm = 0.5 * (ca.log if isinstance(base, ca.SX) else np.log)(base * base + 1e-16)
+    logarithm = 0.5 * log(base * base + 1e-16)
     return exp(exponent * logarithm)
 
 
@@ -93,6 +98,13 @@ def sinc(value: Any) -> Any:
     safe = where(large, value, 1.0)
     square = value * value
     return where(large, sin(safe) / safe, 1.0 - square / 6.0 * (1.0 - square / 20.0))
+
+
+def log1p_mean(value: Any) -> Any:
+    """log(1 + value) / value for value >= 0, smooth at zero."""
+    large = value > 1e-3
+    safe = where(large, value, 1.0)
+    return where(large, log(1.0 + safe) / safe, 1.0 - value * (1.0 / 2.0 - value * (1.0 / 3.0 - value / 4.0)))
 
 
 def decay_means(decay: Any) -> tuple[Any, Any]:

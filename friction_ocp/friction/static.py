@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from friction_ocp.friction.law import AbstractFrictionLaw
-from friction_ocp.friction.smoothing import exp, positive_part, power, where
+from friction_ocp.friction.smoothing import exp, log1p_mean, positive_part, power, where
 from friction_ocp.parameters import Value, quantity
 
 
@@ -54,9 +54,13 @@ class CoulombViscous(AbstractFrictionLaw):
         return self.tau_c + self.viscous * speed
 
 
-def stribeck_share(speed: Any, omega_s: Any, delta: Any) -> Any:
-    """Return exp(-(speed / omega_s)^delta), with finite derivatives at standstill for delta < 1."""
-    return exp(-power(speed / omega_s, delta))
+def stribeck_share(speed: Any, omega_s: Any, delta: Any, tail: Any = None) -> Any:
+    """Return (1 + tail s)^(-1 / tail) of s = (speed / omega_s)^delta, exp(-s) without a tail.
+
+    With finite derivatives at standstill for delta < 1.
+    """
+    fall = power(speed / omega_s, delta)
+    return exp(-fall if tail is None else -fall * log1p_mean(tail * fall))
 
 
 @dataclass(frozen=True)

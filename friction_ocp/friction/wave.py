@@ -1,4 +1,4 @@
-"""What repeats over an angle or over time: cosine and sine of a period and, where there are any, of its overtones."""
+"""What repeats over an angle or over time: cosine and sine of a period, of its overtones and of another period."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from friction_ocp.parameters import Value, is_off, quantity
 class Wave:
     r"""Numbers of :math:`\sum_k c_k \cos(2 \pi k x / P) + s_k \sin(2 \pi k x / P)`; who uses it says what x is.
 
-    A subclass says what its numbers are and in which units; overtones that are None are none.
+    A subclass says what its numbers are and in which units; overtones that are None are none, and so is the wave of
+    another period, as the slots of a motor have beside its magnets, or the teeth of a gear beside its turn.
     """
 
     cosine: Value
@@ -24,6 +25,9 @@ class Wave:
     second_sine: Value = None
     third_cosine: Value = None
     third_sine: Value = None
+    other_cosine: Value = None
+    other_sine: Value = None
+    other_period: Value = None
 
     def __init_subclass__(cls, *, kind: str, of: str, over: str, period: str) -> None:
         """Declare the numbers of a wave: `kind` names the unit of the parts of what it is a wave `of`.
@@ -36,6 +40,8 @@ class Wave:
         for order in ("second", "third"):
             meaning = {part: f"{part} part of the {order} order of {of}" for part in parts}
             numbers |= {f"{order}_{part}": quantity(kind, meaning[part], None) for part in parts}
+        numbers |= {f"other_{part}": quantity(kind, f"{part} part of a further wave of {of}", None) for part in parts}
+        numbers["other_period"] = quantity(over, f"period of the further wave of {of}", None, nested="guess")
         cls.__annotations__ = dict.fromkeys(numbers, Value)
         for name, number in numbers.items():
             setattr(cls, name, number)
@@ -43,21 +49,31 @@ class Wave:
     @property
     def idle(self) -> bool:
         """Whether all amplitudes are plainly zero, so that the wave is none."""
-        return all(is_off(part) for _, *parts in self._terms() for part in parts)
+        return all(is_off(part) for _, _, *parts in self._terms() for part in parts)
 
     @property
     def has_overtones(self) -> bool:
-        """Whether it is more than one cosine and one sine."""
-        return len(self._terms()) > 1
+        """Whether it has a second or third order."""
+        orders = (self.second_cosine, self.second_sine, self.third_cosine, self.third_sine)
+        return any(part is not None for part in orders)
 
-    def _terms(self) -> list[tuple[int, Any, Any]]:
-        """Return order, cosine part and sine part of what there is."""
-        overtones = (2, self.second_cosine, self.second_sine), (3, self.third_cosine, self.third_sine)
-        found: list[tuple[int, Any, Any]] = [(1, self.cosine, self.sine)]
-        for order, *parts in overtones:
+    @property
+    def has_other(self) -> bool:
+        """Whether it has a wave of another period."""
+        return self.other_cosine is not None or self.other_sine is not None
+
+    def _terms(self) -> list[tuple[int, Any, Any, Any]]:
+        """Return order, period of the first order, cosine part and sine part of what there is."""
+        further = [
+            (2, self.period, self.second_cosine, self.second_sine),
+            (3, self.period, self.third_cosine, self.third_sine),
+            (1, self.other_period, self.other_cosine, self.other_sine),
+        ]
+        found: list[tuple[int, Any, Any, Any]] = [(1, self.period, self.cosine, self.sine)]
+        for order, period, *parts in further:
             if any(part is not None for part in parts):
                 cosine, sine = (0.0 if part is None else part for part in parts)
-                found.append((order, cosine, sine))
+                found.append((order, period, cosine, sine))
         return found
 
     def value(self, at: Any, passed: Any = None) -> Any:
@@ -78,8 +94,8 @@ class Wave:
     def _sum(self, at: Any, passed: Any, derivatives: int) -> Any:
         """Return the sum of all orders, derived once or twice by x: each time cosine and sine change places."""
         total: Any = None
-        for order, cosine, sine in self._terms():
-            rate = 2.0 * math.pi * order / self.period
+        for order, period, cosine, sine in self._terms():
+            rate = 2.0 * math.pi * order / period
             for _ in range(derivatives):
                 cosine, sine = rate * sine, -rate * cosine
             value = cosine * cos(rate * at) + sine * sin(rate * at)

@@ -46,6 +46,7 @@ class StribeckRiseSection(Section):
     torque: FrictionNumber
     omega_s: FrictionNumber
     delta: FrictionNumber = 2.0
+    tail: FrictionNumber = None
 
 
 class BendSection(Section):

@@ -117,20 +117,40 @@ def candidate(effect: str, *sizes: float, gain: float = 1.0) -> Screened:
     return Screened(effect, "motor", gain, 0.0, starts, Augmentation(cast(Any, None), {"size": 0.0}, ()))
 
 
-def test_what_lost_runs_promise_is_tried_beside_what_loosely_joined_segments_do() -> None:
-    """The first few stay chosen, be it for a third of the largest promise: neither prediction holds."""
+@pytest.mark.parametrize(
+    ("gains", "kept"),
+    [([5.0, 9.0, 1.0, 8.0, 2.0], [1, 3, 0]), ([0.1, 9.0, 0.2, 0.3, 0.4], [1, 4]), ([0.0] * 5, [0, 1, 2, 3, 4])],
+)
+def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with(
+    gains: list[float], kept: list[int]
+) -> None:
+    """What either prediction promises is fitted there; the best two, and what gains half as much, are refitted."""
     large, small = candidate("cogging", 1.0, gain=3.0), candidate("load_dependence", 1.0)
     last = [candidate("warm_up", 1.0, gain=0.5) for _ in range(BEGUN)]
     loose = candidate("position_ripple", 1.0, gain=5.0)
     bench = SimpleNamespace(current=SimpleNamespace(lost=True, astray=True))
+    tried = [large, small, *last[: BEGUN - 2], loose]
+    assert len(tried) == len(gains)
 
     def screened_loosely(keys: list[Key]) -> list[Screened]:
         return [loose]
 
-    crew = cast(Any, SimpleNamespace(bench=bench, screened_loosely=screened_loosely))
-    chosen, unfitted = to_refit(crew, [large, small, *last], [large, small])
-    assert chosen == [large, small, *last[: BEGUN - 2], loose]
+    def fitted_loosely(candidates: list[Screened]) -> list[float]:
+        assert candidates == tried
+        return gains
+
+    crew = SimpleNamespace(bench=bench, screened_loosely=screened_loosely, fitted_loosely=fitted_loosely)
+    chosen, unfitted = to_refit(cast(Any, crew), [large, small, *last], [large, small])
+    assert [tried.index(item) for item in chosen] == kept
     assert unfitted == []
+
+
+def test_a_fit_of_loosely_joined_segments_tells_what_is_missing(bench: Bench) -> None:
+    """Predictions are straight lines; fits gain most with what is missing, more than twice what others do."""
+    crew = crew_of(bench)
+    found = {item.key: item for item in crew.screened_loosely(NAMES)}
+    first, *others = crew.fitted_loosely([found[key] for key in NAMES])
+    assert first > 2.0 * max(others)
 
 
 def test_a_refit_begins_where_either_prediction_says() -> None:

@@ -27,13 +27,13 @@ from friction_ocp.drive.parts import (
 )
 from friction_ocp.drive.stepping import stepped
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import Clues
+from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.effects.registry import effects
 from friction_ocp.friction.composite import AddedFriction, StribeckRise, Sum
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.static import CoulombViscous
-from friction_ocp.parameters import Free
+from friction_ocp.parameters import Free, start_of
 
 EXPONENT = 0.8
 LAW = CoulombViscous(0.1, 0.02)
@@ -92,13 +92,26 @@ def values_of(result: dict[str, Any]) -> dict[str, float]:
     return {name.rpartition(".")[2]: item["value"] for name, item in accepted["parameters"].items()}
 
 
+def lacking(period: float) -> Clues:
+    """Return clues of a motor, 0.7 rad of whose angle one wave takes, that lacks a wave over its angle."""
+    time = 1e-3 * np.arange(6000)
+    theta = 20.0 * time
+    middle = np.arange(2, 6000, 4)
+    torque = 0.02 * np.cos(2.0 * np.pi * theta[middle] / period)
+    missing = Missing(middle, {"motor": torque, "load": 5.0 * torque})
+    angles, speeds = {"motor": theta, "load": theta / 5.0}, {"motor": np.full(6000, 20.0), "load": np.full(6000, 4.0)}
+    track = Track(time, angles, speeds, {"drive": np.ones(6000)}, missing, missing)
+    return Clues((track,), {"motor-load.stiffness": 800.0}, {"motor": 1.0, "load": 5.0})
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_begins_as_what_it_was(name: str) -> None:
-    """At its off values the drive is the one it was, at others it is not; and there is one more general shape."""
-    (drive, place), effect, clues = SHAPES[name], effects()[name], Clues((), {}, {})
+    """At its off values the drive is the one it was, at others it is not; and there is an end to more general shapes."""
+    (drive, place), effect, clues = SHAPES[name], effects()[name], lacking(0.35)
     found = effect.reshaped(drive, place, clues)
     assert found is not None and effect.addition(drive, place, clues) == found
-    assert effect.reshaped(found.drive, place, clues) is None
+    further = effect.reshaped(found.drive, place, clues)
+    assert further is None or effect.reshaped(further.drive, place, clues) is None
     assert set(found.off) == {path for trial in found.trials for grown in trial.amplitudes for path in grown}
     plain, off = moved(drive, {}), moved(found.drive, found.off)
     assert off == pytest.approx(plain, rel=1e-12)
@@ -106,11 +119,23 @@ def test_a_shape_begins_as_what_it_was(name: str) -> None:
     assert moved(found.drive, found.trials[0].values(found.off, sizes)) != pytest.approx(plain, rel=1e-9)
 
 
+@pytest.mark.parametrize(("period", "also"), [(0.35, "second_cosine"), (0.7, "second_cosine"), (0.43, "other_cosine")])
+def test_what_is_missing_beside_a_wave_says_its_shape(period: float, also: str) -> None:
+    """At half the period of the wave it has overtones, at none of its orders it is beside another wave; both in turn."""
+    drive, effect, clues = geared(cogging=Cogging(0.05, 0.08, 0.7)), effects()["cogging"], lacking(period)
+    found = effect.reshaped(drive, "motor", clues)
+    assert found is not None and f"drive.cogging.{also}" in found.off
+    if also == "other_cosine":
+        periods = [trial.fixed["drive.cogging.other_period"] for trial in found.trials]
+        assert periods[0] == pytest.approx(period, rel=0.01)
+        assert effect.reshaped(found.drive, "motor", lacking(0.35)) is not None
+
+
 def test_overtones_start_small_beside_a_wave_that_is_not_fitted_yet() -> None:
     """Where nothing is known of the size of a wave, its guess tells."""
     small = 2e-4
     drive = geared(cogging=Cogging(Free(small), Free(0.0), 0.7))
-    found = effects()["cogging"].reshaped(drive, "motor", Clues((), {}, {}))
+    found = effects()["cogging"].reshaped(drive, "motor", lacking(0.35))
     assert found is not None
     sizes = [size for trial in found.trials for grown in trial.amplitudes for size in grown.values()]
     assert sizes == pytest.approx([0.1 * small] * len(sizes))
@@ -128,7 +153,7 @@ def test_other_effects_keep_their_shape() -> None:
 def moved(drive: Drive, values: Mapping[str, float]) -> list[float]:
     """Return the state a step after some state in motion."""
     made = stepped(drive)
-    numbers = {leaf.path: leaf.value for leaf in drive_leaves(drive)} | dict(values)
+    numbers = {leaf.path: start_of(leaf.value) for leaf in drive_leaves(drive)} | dict(values)
     at = [1.3, 0.2, 2.0, 0.5][: len(made.state_names)]
     after = made.step(
         at, [0.4, 0.13, 0.13][: len(made.input_names)], [numbers[name] for name in made.parameter_names], 1e-3, 0
@@ -153,6 +178,19 @@ def test_overtones_belong_to_their_wave(tmp_path: Path) -> None:
     sizes = [np.hypot(found[f"{order}cosine"], found[f"{order}sine"]) for order in ("", "second_", "third_")]
     assert sizes == pytest.approx(np.hypot(COSINES, SINES), rel=0.1)
     assert max(sizes) < TORQUE_CONSTANT
+
+
+@pytest.mark.slow
+def test_a_wave_of_another_period_belongs_to_its_effect(tmp_path: Path) -> None:
+    """Slots beside magnets, in no ratio of small numbers, are no second ripple; both periods are found."""
+    plain, periods, sizes = axis(), (3.1, 1.37), (0.03, 0.012)
+    slots = PlantRipple(periods[1], (0.0,), (sizes[1],))
+    magnets = PlantRipple(periods[0], (sizes[0],), (0.0,), beside=slots)
+    plant = replace(plain, motors=(replace(plain.motors[0], cogging=magnets),))
+    found = values_of(diagnosed(tmp_path, plant, ["cogging", "torque_ripple", "position_ripple"]))
+    assert (found["period"], found["other_period"]) == pytest.approx(periods, rel=0.01)
+    assert np.hypot(found["cosine"], found["sine"]) == pytest.approx(sizes[0], rel=0.1)
+    assert np.hypot(found["other_cosine"], found["other_sine"]) == pytest.approx(sizes[1], rel=0.1)
 
 
 @pytest.mark.slow

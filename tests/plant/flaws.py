@@ -13,17 +13,23 @@ Amplitudes = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class PlantRipple:
-    """sum over k of cosine[k] cos(2 pi k x / period) + sine[k] sin(2 pi k x / period), over an angle or the time."""
+    """sum over k of cosine[k] cos(2 pi k x / period) + sine[k] sin(2 pi k x / period), over an angle or the time.
+
+    And the waves of another period `beside` it.
+    """
 
     period: float
     cosine: Amplitudes = 0.0
     sine: Amplitudes = 0.0
+    beside: PlantRipple | None = None
 
     def rows(self) -> Iterator[tuple[float, float, float]]:
         """Yield cosine, sine and wave number of every harmonic."""
         cosines, sines = (v if isinstance(v, tuple) else (v,) for v in (self.cosine, self.sine))
         for k, (cosine, sine) in enumerate(zip_longest(cosines, sines, fillvalue=0.0), start=1):
             yield cosine, sine, 2.0 * pi * k / self.period
+        if self.beside is not None:
+            yield from self.beside.rows()
 
 
 @dataclass(frozen=True)

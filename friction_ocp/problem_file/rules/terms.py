@@ -21,6 +21,18 @@ def warm_up_has_what_it_needs(case: Case) -> Iterator[Finding]:
         yield Finding(case.at(f"drive.shafts[{k}].{key}"), finding.what, finding.allowed, finding.remedy)
 
 
+def further_waves_have_periods(case: Case) -> Iterator[Finding]:
+    """A wave beside that of `period` has a period of its own, and is none without an amplitude."""
+    parts = ("other_cosine", "other_sine")
+    for stem in dict.fromkeys(path.rpartition(".")[0] for path in case.numbers if ".other_" in path):
+        there = [key for key in (*parts, "other_period") if f"{stem}.{key}" in case.numbers]
+        if not {"other_period", *parts} & set(there) or ("other_period" in there and len(there) > 1):
+            continue
+        missing = "other_cosine or other_sine" if "other_period" in there else "other_period"
+        where = case.at(case.place(f"{stem}.{there[0]}"))
+        yield Finding(where, f"a further wave without {missing}", remedy=f"state {missing}, too, or leave it out")
+
+
 def ripples_leave_friction(case: Case) -> Iterator[Finding]:
     """Friction that varies by more than itself would drive the shaft somewhere."""
     for k, shaft in enumerate(case.bound.shafts):
@@ -56,5 +68,5 @@ def settings_have_an_effect(case: Case) -> Iterator[Finding]:
 
 
 TERMS: tuple[Rule, ...] = (ripples_leave_friction, eccentric_sensors_see_angles, settings_have_an_effect)
-WHOLE: tuple[Rule, ...] = (warm_up_has_what_it_needs,)
+WHOLE: tuple[Rule, ...] = (warm_up_has_what_it_needs, further_waves_have_periods)
 """Rules about what has to be there."""

@@ -15,7 +15,7 @@ from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 
 _POSITIVE = {
     *("resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"),
-    *("width", "period", "time_constant", "twist", "saturation_sharpness"),
+    *("width", "period", "other_period", "time_constant", "twist", "saturation_sharpness"),
 }
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
