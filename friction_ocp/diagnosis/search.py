@@ -228,7 +228,8 @@ class Search:
     def _settle(self) -> None:
         """Go over additions that leave nothing but noise: their more general shapes, then the rivals of earlier ones.
 
-        What a shape leaves is too little to tell as power, and yet enough to tell rivals apart that are the same.
+        What a shape leaves is too little to tell as power, and yet enough to tell rivals apart that are the same; and
+        what an earlier addition explained may have been no more than that shape.
         """
         for _ in set(self.accepted):
             done = self._round(self.bench, self.accepted, NONE)
@@ -236,6 +237,8 @@ class Search:
                 break
             self.bench, self.rounds = self.bench.at(done.accepted.fitted), [*self.rounds, done]
             self.accepted = [*self.accepted, done.accepted.key]
+            current, self.accepted = without_superfluous(self.bench, self.accepted, self.level, self.rng, self.run)
+            self.bench = self.bench.at(current)
         if len(set(self.accepted)) > 1:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()

@@ -22,6 +22,12 @@ from friction_ocp.effects.periodic import AbstractWaveEffect
 from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, is_off
 
+HARD = 0.1
+"""Frequency at which a drive swings on flanks of a joint that the model says is rigid, over that of the samples."""
+RUNG, LARGEST_PLAY = 5.0, 0.03
+"""How far apart the plays are at which backlash is tried beyond the twist of the spring, and the largest one over the
+travel: flanks that are hard twist much less than they are apart."""
+
 
 class BacklashEffect(AbstractEffect):
     """Free play."""
@@ -30,15 +36,52 @@ class BacklashEffect(AbstractEffect):
     sentence: ClassVar[str] = "free play between the flanks"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.transmissions if not item.rigid and item.backlash == 0.0]
+        return [item.name for item in drive.transmissions if item.rigid or item.backlash == 0.0]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        item, path = transmission(drive, place), f"{place}.backlash"
-        torque = clues.typical_torque[item.to_shaft]
+        item = transmission(drive, place)
+        return _play_of_rigid(drive, item, clues) if item.rigid else self._play(drive, item, clues)
+
+    def _play(self, drive: Drive, item: Transmission, clues: Clues) -> Augmentation:
+        place, path, torque = item.name, f"{item.name}.backlash", clues.typical_torque[item.to_shaft]
         twist = torque / max(clues.numbers[f"{place}.stiffness"], 1e-300)
         plays = [0.1 * twist, 0.5 * twist, 2.0 * twist]
+        while plays[-1] * RUNG <= LARGEST_PLAY * _travel(item, clues):
+            plays.append(plays[-1] * RUNG)
         added = change_transmission(drive, place, backlash=upwards(twist))
         return Augmentation(added, {path: 0.0}, tuple(Trial(({path: play},)) for play in plays))
+
+
+def _travel(item: Transmission, clues: Clues) -> float:
+    return max(float(np.ptp(track.theta[item.to_shaft])) for track in clues.tracks)
+
+
+def _play_of_rigid(drive: Drive, item: Transmission, clues: Clues) -> Augmentation:
+    """Return the drive with play between flanks as hard as the samples can tell, where there was no twist at all."""
+    rate, inertia = 2.0 * np.pi * HARD / _interval(clues), _swinging(item, clues)
+    spring, loss = inertia * rate**2, 2.0 * inertia * rate
+    plays = [LARGEST_PLAY * _travel(item, clues) / RUNG**k for k in range(4)]
+    path, contact = f"{item.name}.backlash", {f"{item.name}.stiffness": spring, f"{item.name}.damping": loss}
+    added = change_transmission(
+        drive,
+        item.name,
+        stiffness=Free(spring, 1e-3 * spring, 1e2 * spring),
+        damping=Free(loss, 0.0, 1e2 * loss),
+        backlash=upwards(plays[-1]),
+    )
+    off = {path: 0.0, f"{item.name}.stiffness": np.inf}
+    return Augmentation(added, off, tuple(Trial(({path: play},), contact) for play in plays))
+
+
+def _interval(clues: Clues) -> float:
+    return float(np.median(np.diff(clues.tracks[0].time)))
+
+
+def _swinging(item: Transmission, clues: Clues) -> float:
+    """Return the inertia that swings on a spring between both sides of a joint, on the output side."""
+    near = clues.numbers[f"{item.from_shaft}.inertia"] * abs(clues.numbers.get(f"{item.name}.ratio", 1.0)) ** 2
+    far = clues.numbers[f"{item.to_shaft}.inertia"]
+    return near * far / max(near + far, 1e-300) or max(near, far)
 
 
 class ComplianceEffect(AbstractEffect):
@@ -53,11 +96,7 @@ class ComplianceEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         item, path = transmission(drive, place), f"{place}.stiffness"
-        ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
-        near = clues.numbers[f"{item.from_shaft}.inertia"] * ratio**2
-        far = clues.numbers[f"{item.to_shaft}.inertia"]
-        inertia = near * far / max(near + far, 1e-300) or max(near, far)
-        step = float(np.median(np.diff(clues.tracks[0].time)))
+        inertia, step = _swinging(item, clues), _interval(clues)
         rates = [float(rate) for rate in 2.0 * np.pi * np.geomspace(0.01 / step, 0.2 / step, 5)]
         springs = [inertia * rate**2 for rate in rates]
         damping = [0.2 * inertia * rate for rate in rates]

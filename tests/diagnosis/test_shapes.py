@@ -106,7 +106,7 @@ def lacking(period: float) -> Clues:
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_begins_as_what_it_was(name: str) -> None:
-    """At its off values the drive is the one it was, at others it is not; and there is an end to more general shapes."""
+    """At its off values the drive is the one it was, at others it is not; and general shapes have an end."""
     (drive, place), effect, clues = SHAPES[name], effects()[name], lacking(0.35)
     found = effect.reshaped(drive, place, clues)
     assert found is not None and effect.addition(drive, place, clues) == found
@@ -121,7 +121,7 @@ def test_a_shape_begins_as_what_it_was(name: str) -> None:
 
 @pytest.mark.parametrize(("period", "also"), [(0.35, "second_cosine"), (0.7, "second_cosine"), (0.43, "other_cosine")])
 def test_what_is_missing_beside_a_wave_says_its_shape(period: float, also: str) -> None:
-    """At half the period of the wave it has overtones, at none of its orders it is beside another wave; both in turn."""
+    """At half the period of the wave it has overtones, at none of its orders another wave is beside it."""
     drive, effect, clues = geared(cogging=Cogging(0.05, 0.08, 0.7)), effects()["cogging"], lacking(period)
     found = effect.reshaped(drive, "motor", clues)
     assert found is not None and f"drive.cogging.{also}" in found.off
