@@ -41,8 +41,8 @@ def record(plant: Plant, name: str, seed: int) -> Recording:
     time = np.arange(0.0, SECONDS, STEP)
     current = Trajectory(time, np.interp(time, np.asarray(steps.time), np.asarray(steps.value)), "zero")
     run = plant.simulate(SECONDS, {"motor.current": current}, rng)
-    units = {"position": "rad", "current": "A"}
-    return Recording(name, {key: Channel(key, *run.channels[key], units[key]) for key in units})
+    units = {"position": "rad", "load_position": "rad", "current": "A"}
+    return Recording(name, {key: Channel(key, *run.channels[key], units[key]) for key in units if key in run.channels})
 
 
 def plain_drive(viscous: float) -> dict[str, Any]:

@@ -19,12 +19,12 @@ SAMPLES, COST = 1000, 3000.0
 DRIVE: Any = None
 
 
-def completed(*tried: tuple[str, float, float], exhausted: bool = False) -> list[list[str]]:
+def completed(*tried: tuple[str, float, float], exhausted: bool = False, lost: bool = False) -> list[list[str]]:
     """Return the effects whose refits are completed, turn by turn, from (effect, predicted gain, cost after steps)."""
     screened = [Screened(effect, "motor", gain, 0.0, (), Augmentation(DRIVE, {}, ())) for effect, gain, _ in tried]
     refits = [Refit(item, None, cost) for item, (_, _, cost) in zip(screened, tried, strict=True)]
     rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
-    current = SimpleNamespace(cost=COST, linear=SimpleNamespace(rows=rows))
+    current = SimpleNamespace(cost=COST, lost=lost, linear=SimpleNamespace(rows=rows))
     turns = list[list[str]]()
 
     def rivals(some: list[Refit], without: Any, asked: dict[Key, float], thorough: int = 0) -> list[Rival]:
@@ -63,3 +63,18 @@ def test_at_the_limit_of_effort_only_the_best_are_completed() -> None:
     """A search that has taken long enough does not go through what looks worse."""
     tried = (("cogging", 2400.0, 2000.0), ("unbalance", 100.0, 700.0), ("warm_up", 50.0, 2900.0))
     assert completed(*tried, exhausted=True) == [["cogging", "unbalance"]]
+
+
+def test_what_comes_as_near_after_a_few_steps_is_completed_beside_the_best() -> None:
+    """A false promise and the best leave no place for what explains the same as that: it is no less likely."""
+    tried = (("sensor_gain", 2400.0, 2000.0), ("sensor_offset", 1400.0, 1600.0), ("asymmetry", 1390.0, 1640.0))
+    assert completed(*tried) == [["sensor_gain", "sensor_offset"], ["asymmetry"]]
+    further = (*tried, ("warm_up", 50.0, 2900.0))
+    assert completed(*further) == [["sensor_gain", "sensor_offset"], ["asymmetry"], ["warm_up"]]
+
+
+def test_what_lost_runs_promise_counts_for_nothing() -> None:
+    """Only what a few steps leave tells which refits are worth completing."""
+    tried = (("cogging", 2500.0, 2900.0), ("stribeck", 10.0, 700.0), ("unbalance", 10.0, 1500.0))
+    assert completed(*tried, lost=True) == [["stribeck", "unbalance"], ["cogging"]]
+    assert completed(*tried)[0][0] == "cogging"

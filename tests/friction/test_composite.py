@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -60,3 +61,24 @@ def test_terms_on_a_bristle_law_are_carried_by_its_bristle() -> None:
     law = with_added(lugre, coulomb=Directional(0.3, -0.3)).along("negative")
     assert np.allclose(law.magnitude(SPEED), lugre.magnitude(SPEED) - 0.3, rtol=1e-14)
     assert law.has_bristle
+
+
+@pytest.mark.parametrize("tail", [0.0, 1e-6, 5e-4, 0.3, 1.0])
+def test_a_stribeck_curve_ends_as_its_tail_says(tail: float) -> None:
+    """Without a tail like an exponential, with a tail of 1 and an exponent of 2 like the curve of Hess & Soom."""
+    speed = np.array([0.0, 0.1, 1.0, 2.0, 7.0])
+    fall = (speed / 0.8) ** 1.7
+    expected = np.exp(-fall) if tail == 0.0 else (1.0 + tail * fall) ** (-1.0 / tail)
+    assert StribeckRise(0.4, 0.8, 1.7, tail).torque_at(speed) == pytest.approx(0.4 * expected, rel=1e-6, abs=1e-12)
+    assert StribeckRise(0.4, 0.8, 2.0, 1.0).torque_at(1.6) == pytest.approx(0.4 / 5.0, rel=1e-9)
+
+
+def test_a_stribeck_curve_without_a_tail_is_an_exponential() -> None:
+    """A tail of 0 is no other curve than none, and where it begins the curve depends on it smoothly."""
+    tail, speed = ca.SX.sym("tail"), 1.3
+    curve = StribeckRise(0.4, 0.8, 1.7, tail).torque_at(speed)
+    slope = ca.Function("slope", [tail], [curve, ca.jacobian(curve, tail)])
+    value, derivative = (float(item) for item in slope(0.0))
+    assert value == pytest.approx(StribeckRise(0.4, 0.8, 1.7).torque_at(speed), rel=1e-12)
+    fall = (speed / 0.8) ** 1.7
+    assert derivative == pytest.approx(value * 0.5 * fall**2, rel=1e-6)
