@@ -16,6 +16,7 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
 
 STEPS_OF_NODES = 3
 
@@ -68,6 +69,11 @@ class FittedModel:
     def lost(self) -> bool:
         """Whether it is free runs over whole recordings that have gone astray: they have many ends, most far off."""
         return self.astray and self.footing.segment_s is None
+
+    @property
+    def leads_loosely(self) -> bool:
+        """Whether lost free runs are judged as loosely joined segments are, by squares, so that fits of these lead."""
+        return self.lost and isinstance(self.footing.loss, Squares)
 
     @cached_property
     def blocks(self) -> Blocks:

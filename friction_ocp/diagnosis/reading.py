@@ -13,7 +13,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import training_pieces
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import released
-from friction_ocp.diagnosis.polishing import COARSE, polished, timed
+from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.effects.registry import effects
@@ -21,9 +21,6 @@ from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
 
-WORTH_ENDING = 0.5
-"""Share of what the stated reading leaves, left after the first steps, above which another is not fitted to its end:
-what explains all of it takes most of it soon."""
 _DRIVING = ("current", "current_command", "torque", "voltage")
 
 
@@ -57,16 +54,10 @@ def corrections(stated: Problem, read: Problem) -> list[str]:
 
 
 def read_otherwise(problem: Problem, fitted: FittedModel) -> FittedModel:
-    """Return a base model fitted to inputs that are read as another problem says, from where it stands.
-
-    Not to its end where the first few steps leave most of what was left.
-    """
+    """Return a base model fitted to inputs that are read as another problem says, from where it stands."""
     model = with_late(judged_alike(prepare(problem)), late_of(fitted.model))
     foot = replace(fitted.footing, train=training_pieces(model))
-    near = polished(model, foot, fitted.theta, None, COARSE)
-    if innovations(near).beyond > WORTH_ENDING * innovations(fitted).beyond:
-        return near
-    return freed(timed(polished(model, foot, near.theta, near.linear.point.nodes)))
+    return freed(timed(polished(model, foot, fitted.theta, None)))
 
 
 def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool) -> bool:

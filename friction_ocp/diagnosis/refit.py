@@ -98,11 +98,13 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
     """Continue a refit to its end, around the kinks of exact friction that catch it.
 
-    One that is still far from the recordings there lacks more than a way around kinks gives back: unless the refit is
-    of segments and to be `thorough` it is not freed until it is accepted, which most of those are not.
+    One that is still far from the recordings there lacks more than a way around kinks gives back: unless it is of
+    segments and to be `thorough`, or of free runs that loosely joined segments do not lead, it is not freed until it is
+    accepted, which most of those are not.
     """
     ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
-    return ended if ended.lost or (ended.astray and not thorough) else freed(ended)
+    left = ended.astray and ended.footing.segment_s is not None and not thorough
+    return ended if ended.leads_loosely or left else freed(ended)
 
 
 def nudged(fitted: FittedModel, seed: int) -> FittedModel:

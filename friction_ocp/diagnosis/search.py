@@ -48,8 +48,9 @@ BEGUN, MOST_ALIKE = 4, 0.5
 has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
 joined segments, and, whatever they promise, for those of free runs that are lost."""
 NOTABLE = 0.05
-"""Share of what is left by which another fit of the same model must be better to look for effects anew. What leaves no
-more than that beside the best completed refit, after a few steps, is completed, too."""
+"""Share of what is left by which another fit of the same model must be better to look for effects anew."""
+AS_NEAR = 0.01
+"""Share of what the best completed refit leaves up to which what leaves more after a few steps is completed, too."""
 MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
@@ -318,13 +319,13 @@ def to_refit(
 
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
-    joined segments do.
+    joined segments do, where both are judged by squares.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if chosen and current.lost:
         first = [item for item in chosen if item.starts][:BEGUN]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
-        return _leading(tried, crew.fitted_loosely(tried)), []
+        return _leading(tried, crew.fitted_loosely(tried)) if current.leads_loosely else tried, []
     unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
     return with_resembling(chosen, found, current.astray), unfitted
 
@@ -381,16 +382,16 @@ def completed_rivals(
     current = crew.bench.current
     noise = 0.5 * samples(current)
     hopes = [min(refit.cost, max(current.cost - refit.screened.gain, noise)) for refit in refits]
-    if current.lost:
+    if current.leads_loosely:
         hopes = [refit.cost for refit in refits]
     close = sum(hope < CLOSE * min(hopes) for hope in hopes)
-    count, thorough = max(FINISHED, close), min(FINISHED, close) if current.lost else FINISHED
+    count, thorough = max(FINISHED, close), min(FINISHED, close) if current.leads_loosely else FINISHED
     order = sorted(range(len(hopes)), key=lambda k: (hopes[k], refits[k].cost))
     alike = effects()[refits[order[0]].key[0]].resembles
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
     rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
-    reached = noise + (1.0 + NOTABLE) * max(min(item.standing.cost for item in rivals) - noise, 0.0)
+    reached = noise + (1.0 + AS_NEAR) * max(min(item.standing.cost for item in rivals) - noise, 0.0)
     near = [k for k in others if refits[k].cost < reached]
     if near:
         others = [k for k in others if k not in near]

@@ -77,7 +77,7 @@ def _further_size(part: Any, path: str, clues: Clues) -> float:
 class AbstractWaveEffect(AbstractEffect):
     """A wave that a part of the drive lacks; once one was accepted, with overtones or a wave of another period.
 
-    Which of both comes first, the strongest period of what is still missing says.
+    Which of both, the strongest period of what is still missing says.
     """
 
     kind: ClassVar[type[Wave]]
@@ -100,18 +100,16 @@ class AbstractWaveEffect(AbstractEffect):
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         plain, path = self.there(drive, place)
-        if plain is None or (plain.has_overtones and plain.has_other):
+        if plain is None or plain.has_overtones or plain.has_other:
             return None
         period = clues.numbers.get(f"{path}.period", start_of(plain.period))
         known = [period / order for order in (1, 2, 3)]
-        found = [] if plain.has_other else self.size_and_periods(drive, place, clues)[1]
+        found = self.size_and_periods(drive, place, clues)[1]
         strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
-        if not plain.has_overtones and (not strange or strange[0] != found[0]):
-            part, off, trials = overtones(plain, path, clues)
-        elif strange:
+        if strange and strange[0] == found[0]:
             part, off, trials = other_wave(self.kind, plain, path, clues, strange)
         else:
-            return None
+            part, off, trials = overtones(plain, path, clues)
         return Augmentation(self.with_wave(drive, place, part), off, trials)
 
 

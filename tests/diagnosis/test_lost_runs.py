@@ -128,7 +128,7 @@ def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with
     large, small = candidate("cogging", 1.0, gain=3.0), candidate("load_dependence", 1.0)
     last = [candidate("warm_up", 1.0, gain=0.5 - 0.1 * k) for k in range(BEGUN)]
     loose = candidate("position_ripple", 1.0, gain=5.0)
-    bench = SimpleNamespace(current=SimpleNamespace(lost=True, astray=True))
+    bench = SimpleNamespace(current=SimpleNamespace(lost=True, leads_loosely=True, astray=True))
     tried = [large, small, *last[: BEGUN - 2], loose]
     assert len(tried) == len(gains)
 
