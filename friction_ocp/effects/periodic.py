@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -29,15 +29,16 @@ from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, start_of
 
 
-def wave(
-    kind: type[Any], path: str, size: float, periods: list[float]
-) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
-    """Return a wave with free amplitudes and period, its off values and a trial for each period."""
+def wave(stem: str, size: float, periods: list[float]) -> tuple[list[Free], dict[str, float], tuple[Trial, ...]]:
+    """Return free cosine, sine and period of a wave, its off values and a trial for each period.
+
+    `stem` is what the paths of its numbers begin with.
+    """
     amplitude = either_way(size)
     period = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
-    paths = [f"{path}.{part}" for part in ("cosine", "sine")]
-    trials = tuple(Trial(tuple({name: size} for name in paths), {f"{path}.period": each}) for each in periods)
-    return kind(amplitude, amplitude, period), dict.fromkeys(paths, 0.0), trials
+    paths = [f"{stem}{part}" for part in ("cosine", "sine")]
+    trials = tuple(Trial(tuple({name: size} for name in paths), {f"{stem}period": each}) for each in periods)
+    return [amplitude, amplitude, period], dict.fromkeys(paths, 0.0), trials
 
 
 FURTHER = 0.1
@@ -56,17 +57,11 @@ def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float]
 
 
 def other_wave(
-    kind: type[Any], part: Any, path: str, clues: Clues, periods: list[float]
+    part: Any, path: str, clues: Clues, periods: list[float]
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with a free one of another period beside it, off values and a trial for each period."""
-    plain, off, trials = wave(kind, f"{path}.other", _further_size(part, path, clues), periods)
-
-    def named(values: Mapping[str, float]) -> dict[str, float]:
-        return {name.replace(f"{path}.other.", f"{path}.other_"): value for name, value in values.items()}
-
-    added = replace(part, other_cosine=plain.cosine, other_sine=plain.sine, other_period=plain.period)
-    turned = tuple(Trial(tuple(map(named, item.amplitudes)), named(item.fixed)) for item in trials)
-    return added, named(off), turned
+    (cosine, sine, period), off, trials = wave(f"{path}.other_", _further_size(part, path, clues), periods)
+    return replace(part, other_cosine=cosine, other_sine=sine, other_period=period), off, trials
 
 
 def _further_size(part: Any, path: str, clues: Clues) -> float:
@@ -95,8 +90,9 @@ class AbstractWaveEffect(AbstractEffect):
         """Return the size of a trial and the periods that are tried."""
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        part, off, trials = wave(self.kind, self.there(drive, place)[1], *self.size_and_periods(drive, place, clues))
-        return Augmentation(self.with_wave(drive, place, part), off, trials)
+        path = self.there(drive, place)[1]
+        numbers, off, trials = wave(f"{path}.", *self.size_and_periods(drive, place, clues))
+        return Augmentation(self.with_wave(drive, place, self.kind(*numbers)), off, trials)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         plain, path = self.there(drive, place)
@@ -107,7 +103,7 @@ class AbstractWaveEffect(AbstractEffect):
         found = self.size_and_periods(drive, place, clues)[1]
         strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
         if strange and strange[0] == found[0]:
-            part, off, trials = other_wave(self.kind, plain, path, clues, strange)
+            part, off, trials = other_wave(plain, path, clues, strange)
         else:
             part, off, trials = overtones(plain, path, clues)
         return Augmentation(self.with_wave(drive, place, part), off, trials)

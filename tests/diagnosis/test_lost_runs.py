@@ -16,11 +16,11 @@ from plant import PlantController, Trajectory, reversing_steps
 
 from friction_ocp.diagnosis import refit
 from friction_ocp.diagnosis.bench import Bench, open_bench
+from friction_ocp.diagnosis.contenders import BEGUN, beginning_at, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.polishing import loosely
 from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
 from friction_ocp.diagnosis.screen import Screened, Start
-from friction_ocp.diagnosis.search import BEGUN, beginning_at, displaced, to_refit
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.effects.effect import Augmentation, Trial
 from friction_ocp.estimation.model import Model

@@ -26,9 +26,10 @@ def further_waves_have_periods(case: Case) -> Iterator[Finding]:
     parts = ("other_cosine", "other_sine")
     for stem in dict.fromkeys(path.rpartition(".")[0] for path in case.numbers if ".other_" in path):
         there = [key for key in (*parts, "other_period") if f"{stem}.{key}" in case.numbers]
-        if not {"other_period", *parts} & set(there) or ("other_period" in there and len(there) > 1):
+        waves, periodic = there[0] in parts, there[-1] == "other_period"
+        if waves and periodic:
             continue
-        missing = "other_cosine or other_sine" if "other_period" in there else "other_period"
+        missing = "other_cosine or other_sine" if periodic else "other_period"
         where = case.at(case.place(f"{stem}.{there[0]}"))
         yield Finding(where, f"a further wave without {missing}", remedy=f"state {missing}, too, or leave it out")
 

@@ -7,10 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 
+from friction_ocp.diagnosis.contenders import completed_rivals
 from friction_ocp.diagnosis.crew import Crew, Refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.search import completed_rivals
 from friction_ocp.diagnosis.worth import Key
 from friction_ocp.effects.effect import Augmentation
 

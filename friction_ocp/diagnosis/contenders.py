@@ -1,0 +1,126 @@
+"""Which candidates of a round are refitted, and which of these refits are completed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from friction_ocp.diagnosis.crew import Crew
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.diagnosis.select import Round, gave_shape
+from friction_ocp.diagnosis.worth import Key, samples, with_resembling
+from friction_ocp.effects.registry import effects
+
+FINISHED, CLOSE = 2, 1.5
+"""Candidates whose refit is completed: the best after a few steps or by prediction, which leaves noise at least, and
+all whose objective is within this factor; and what resembles the best. As many begin again at other sizes where that
+leads nowhere."""
+BEGUN, MOST_ALIKE = 4, 0.5
+"""Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
+has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
+joined segments, and, whatever they promise, for those of free runs that are lost."""
+AS_NEAR = 0.01
+"""Share of what the best completed refit leaves up to which what leaves more after a few steps is completed, too."""
+
+
+def _promising(found: Sequence[Screened]) -> list[Screened]:
+    """Return the few candidates that promise most."""
+    return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
+
+
+def to_refit(
+    crew: Crew, chosen: Sequence[Screened], found: Sequence[Screened]
+) -> tuple[list[Screened], list[Screened]]:
+    """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
+
+    The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
+    share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
+    joined segments do, where both are judged by squares.
+    """
+    current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
+    if chosen and current.lost:
+        first = [item for item in chosen if item.starts][:BEGUN]
+        tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
+        return _leading(tried, crew.fitted_loosely(tried)) if current.leads_loosely else tried, []
+    unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
+    return with_resembling(chosen, found, current.astray), unfitted
+
+
+def _leading(tried: Sequence[Screened], gains: Sequence[float]) -> list[Screened]:
+    """Return candidates that gain a notable share of the most where segments are loosely joined, two at least."""
+    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    enough = MOST_ALIKE * gains[order[0]]
+    return [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
+
+
+def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:
+    """Return what might have been in the place of the last addition: what it promises beside that says little.
+
+    Only where another shape took it, since that can do a part of another effect's work.
+    """
+    if not chosen or not rounds or not gave_shape(rounds, -1):
+        return []
+    keys, taken = [item.key for item in rounds[-1].choice.aliases], {item.key for item in chosen}
+    return [known[key] for key in keys if key in known and key not in taken and known[key].starts]
+
+
+def beginning_at(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
+    """Return chosen candidates and others; of those that are among both the refit begins where either predicts."""
+    also = {item.key: item for item in others}
+    both = [
+        replace(item, starts=(*also.pop(item.key).starts[:1], *item.starts)) if item.key in also else item
+        for item in chosen
+    ]
+    return [*both, *also.values()]
+
+
+def completed_rivals(
+    crew: Crew,
+    chosen: Sequence[Screened],
+    unfitted: Sequence[Screened],
+    known: Mapping[Key, Screened],
+    asked: Mapping[Key, float],
+    exhausted: Callable[[], bool] = lambda: False,
+) -> Iterator[list[Rival]]:
+    """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
+
+    What lost free runs promise is no prediction, and nothing is made thorough that is far behind there.
+    What fits best where it was fitted may be worth nothing on recordings left out. Where it gains what is `asked` of it
+    and yet will not do, it may have come to rest on the way: at last the best of those begin at other sizes. The first
+    are completed in any case, further ones as long as the search is not `exhausted`.
+    """
+    if not chosen:
+        return
+    without, tried = crew.without(chosen, unfitted)
+    refits = [replace(refit, screened=known[refit.key]) for refit in tried]
+    if not refits:
+        return
+    current = crew.bench.current
+    noise = 0.5 * samples(current)
+    hopes = [refit.cost for refit in refits]
+    if not current.leads_loosely:
+        hopes = [min(refit.cost, max(current.cost - refit.screened.gain, noise)) for refit in refits]
+    close = sum(hope < CLOSE * min(hopes) for hope in hopes)
+    count, thorough = max(FINISHED, close), min(FINISHED, close) if current.leads_loosely else FINISHED
+    order = sorted(range(len(hopes)), key=lambda k: (hopes[k], refits[k].cost))
+    alike = effects()[refits[order[0]].key[0]].resembles
+    first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
+    others = [k for k in order if k not in first]
+    rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
+    reached = noise + (1.0 + AS_NEAR) * max(min(item.standing.cost for item in rivals) - noise, 0.0)
+    near = [k for k in others if refits[k].cost < reached]
+    if near:
+        others = [k for k in others if k not in near]
+        rivals = [*rivals, *crew.rivals([refits[k] for k in near], without, asked)]
+    yield rivals
+    if others and exhausted():
+        return
+    if others:
+        rivals = [*rivals, *crew.rivals([refits[k] for k in others], without, asked)]
+        yield rivals
+    rivals.sort(key=lambda item: item.standing.cost)
+    able = [item for item in rivals if current.cost - item.standing.cost >= asked[item.key] and item.screened.starts]
+    again = able[:FINISHED]
+    if again and not exhausted():
+        yield [*crew.retried(again, without, asked), *(item for item in rivals if item not in again)]
