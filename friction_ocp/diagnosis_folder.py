@@ -10,14 +10,18 @@ from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.excitation.next_experiment import follow_up
+from friction_ocp.execution.executor import AbstractExecutor, InProcess
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import run_series
 from friction_ocp.result_folder import plain_arrays
 from friction_ocp.whole_file import write_text
 
 
-def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
-    """Write everything that `diagnose` leaves behind and return the folder."""
+def save_diagnosis(diagnosis: Diagnosis, folder: str | Path, executor: AbstractExecutor = InProcess()) -> Path:
+    """Write everything that `diagnose` leaves behind and return the folder.
+
+    The executor works on what to record next.
+    """
     from friction_ocp.plots.diagnosis import diagnosis_figures
     from friction_ocp.plots.figures import file_stem
     from friction_ocp.plots.style import figure_style, save
@@ -26,7 +30,7 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path) -> Path:
     from friction_ocp.report.diagnosis_page import write_diagnosis_report
 
     target = Path(folder)
-    following = follow_up(diagnosis)
+    following = follow_up(diagnosis, executor)
     document = diagnosis_document(diagnosis, following)
     target.mkdir(parents=True, exist_ok=True)
     before, after = (_series(diagnosis, errors) for errors in (diagnosis.before, diagnosis.after))

@@ -32,11 +32,11 @@ def _diagnose(options: argparse.Namespace) -> int:
 
     folder, problem = output_folder(options), checked(options, search=True)
     try:
-        diagnosis = diagnose(problem, _Lines(), Execution(executor(options), folder))
+        with executor(options).kept(diagnose) as kept:
+            save_diagnosis(diagnose(problem, _Lines(), Execution(kept, folder)), folder, kept)
     except KeyboardInterrupt:
         print(f"diagnose: what has ended is in {folder / 'tasks'}; the same command goes on", file=sys.stderr)
         raise
-    save_diagnosis(diagnosis, folder)
     show(options, folder, diagnosis_summary)
     return DONE
 

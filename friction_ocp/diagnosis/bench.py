@@ -124,8 +124,7 @@ class Bench:
             return None
         return FittedModel(current.model, current.footing, linear_program(program, point))
 
-    @cached_property
-    @once
+    @property
     def clues(self) -> Clues:
         """What the current model says about sizes."""
         return clues_of(self.current)

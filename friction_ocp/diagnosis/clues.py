@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,7 @@ from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
+from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
@@ -30,9 +32,18 @@ FINE, MOST_FINE = 4, 3000
 MISSED = 0.1
 """Torque that may be missing over that which moves a shaft. Ten times more or less shows the same waves."""
 
+_known: WeakKeyDictionary[FittedModel, Clues] = WeakKeyDictionary()
+
 
 def clues_of(fitted: FittedModel) -> Clues:
-    """Return what the fitted model says about motions and torques."""
+    """Return what the fitted model says about motions and torques; it is worked out once for every fit."""
+    if fitted not in _known:
+        _known[fitted] = _clues_of(fitted)
+    return _known[fitted]
+
+
+@once
+def _clues_of(fitted: FittedModel) -> Clues:
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
     tables = [_table(fitted, index, watch, names) for index in range(len(fitted.linear.recordings))]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
@@ -51,6 +52,8 @@ class Crew:
     execution: Execution
     number: int
     tell: Tell
+    readings: OtherReadings | None = None
+    """What is fitted beside the refits."""
 
     def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
         """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
@@ -91,9 +94,14 @@ class Crew:
         simulation breaks down on the way are left out.
         """
         tasks = [Task(f"{self.number}-held-out", held_out_costs)]
+        aside = [] if self.readings is None else self.readings.tasks(self.bench)
+        tasks += aside  # takes longer than a refit, mostly, and what takes long comes first
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
         tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]
-        costs, *ends = self._run("refits", tasks, 0.5)
+        costs, *values = self._run("refits", tasks, 0.5)
+        ends = values[len(aside) :]
+        if self.readings is not None:
+            self.readings.keep(self.bench, values[: len(aside)])
         best = dict[tuple[str, str], Refit]()
         for item, end in zip([*shortlist, *unfitted], ends, strict=True):
             cost = np.inf if end is None else float(restored(end["cost"]))

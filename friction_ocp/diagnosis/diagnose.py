@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
@@ -15,7 +16,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
-from friction_ocp.diagnosis.reading import explains_more, other_readings, read_otherwise
+from friction_ocp.diagnosis.reading import explains_more
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
@@ -138,13 +139,13 @@ def diagnose(
     Where the inputs, read the other way between their samples, leave nothing with fewer additions, or where something
     was left, that is how they are read.
     """
-    stated = _diagnosed(problem, tell, execution)
+    readings = OtherReadings(problem)
+    stated = _diagnosed(problem, tell, execution, readings)
     if not stated.gap:
         return stated
     tell("the inputs read the other way", 0.0)
-    others = [(other, read_otherwise(other, stated.base)) for other in other_readings(problem)]
     final, accepted, left = stated.final, stated.accepted, stated.left_over
-    able = [(other, base) for other, base in others if base.holds and explains_more(base, final, accepted, left)]
+    able = [pair for pair in readings.fitted(stated.base) if explains_more(pair[1], final, accepted, left)]
     if not able:
         return stated
     other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)
@@ -153,8 +154,8 @@ def diagnose(
     return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
 
 
-def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
-    """Find what a model lacks, the inputs read as the problem says.
+def _diagnosed(problem: Problem, tell: Tell, execution: Execution, readings: OtherReadings | None = None) -> Diagnosis:
+    """Find what a model lacks, the inputs read as the problem says; others are fitted beside.
 
     The base fit, score tests and refits of a round are tasks: in whatever process, with the same numbers, and taken
     from the output folder where an earlier run ended them.
@@ -164,7 +165,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
         run = replace(execution, executor=executor)
-        search = Search(open_bench(problem, run), run, meant, level, tell, patience)
+        search = Search(open_bench(problem, run), run, meant, level, tell, patience, readings)
         search.go()
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
     current, checked = _checked(search.bench.current, meant, level)

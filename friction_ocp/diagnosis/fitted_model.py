@@ -21,9 +21,9 @@ from friction_ocp.simulation.losses import Squares
 STEPS_OF_NODES = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A model at its best parameters on a footing."""
+    """A model at its best parameters on a footing; two of them are never the same."""
 
     model: Model
     footing: Footing

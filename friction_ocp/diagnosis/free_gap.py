@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,11 +69,14 @@ def free_errors(fitted: FittedModel, held_out: bool) -> FreeErrors:
     return _errors(fitted, simulate_recordings(model, items, fitted.theta))
 
 
-def left_out_errors(fitted: FittedModel) -> FreeErrors:
-    """Simulate training recordings, or pieces of the only one, freely with parameters that they took no part in."""
-    items, runs = fitted.linear.program.experiments, list[FreeRun]()
-    for group in folds(fitted):
-        theta = fitted_without(fitted, group)
+def left_out_errors(fitted: FittedModel, known: Sequence[FloatArray] | None = None) -> FreeErrors:
+    """Simulate training recordings, or pieces of the only one, freely with parameters that they took no part in.
+
+    These may be `known`, by fold.
+    """
+    groups, items, runs = folds(fitted), fitted.linear.program.experiments, list[FreeRun]()
+    thetas = [fitted_without(fitted, group) for group in groups] if known is None else known
+    for group, theta in zip(groups, thetas, strict=True):
         runs += simulate_recordings(fitted.model, tuple(items[k] for k in group), theta)
     return _errors(fitted, tuple(runs))
 

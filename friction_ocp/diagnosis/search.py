@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
+from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over, left_out_errors
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.left_out import left_out_before_and_after
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
@@ -63,6 +65,8 @@ class Search:
     tell: Tell
     patience: float = 1.0
     """Effort that the search may take, over the usual one."""
+    readings: OtherReadings | None = None
+    """Other readings of the inputs, to be looked at where something is missing."""
     rounds: list[Round] = field(default_factory=list[Round])
     accepted: list[Key] = field(default_factory=list[Key])
     taken_back: list[Round] = field(default_factory=list[Round])
@@ -70,6 +74,8 @@ class Search:
     cut_short: bool = False
     """Whether the search ended at its limit of effort, with things left to try."""
     _begun: int = 0
+    _compared: tuple[FittedModel, FreeErrors, FreeErrors] | None = None
+    """The current model that free runs were last compared for, and these."""
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
@@ -232,10 +238,11 @@ class Search:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()
 
-    @cached_property
-    def _left_out(self) -> FreeErrors:
-        """Free runs of the base model where recordings took no part."""
-        return left_out_errors(self.bench.base)
+    def _left_out(self) -> tuple[FreeErrors, FreeErrors]:
+        """Return free runs where recordings took no part, of the base model and of the current one."""
+        if self._compared is None or self._compared[0] is not self.bench.current:
+            self._compared = (self.bench.current, *left_out_before_and_after(self.bench, self.run))
+        return self._compared[1:]
 
     def _helps(self) -> bool:
         """Whether what was added leaves nothing, or takes a part and makes free runs of training recordings left out
@@ -249,7 +256,7 @@ class Search:
             return True
         if base.cost - current.cost < PART * (base.cost - 0.5 * samples(base)):
             return False
-        before, after = self._left_out, left_out_errors(current)
+        before, after = self._left_out()
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 
     def _falls_short(self) -> bool:
@@ -257,7 +264,7 @@ class Search:
 
         Small slow torques hide below the noise of samples and yet move the drive.
         """
-        before, after = self._left_out, left_out_errors(self.bench.current)
+        before, after = self._left_out()
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
@@ -267,13 +274,14 @@ class Search:
         """
         self._begun += 1
         number = self._begun
-        crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share))
         current, blocks, level = bench.current, bench.current.blocks, self.level
+        power = excess(current.linear.rows, blocks)
+        aside = None if accepted or not power.significant(level) else self.readings
+        crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share), aside)
         enough = required(bench.base, current) if meant.names else np.inf
         again = shapes(current, bench.clues, accepted)
         keys = [*places(current, meant), *again]
         found = crew.screened(keys)
-        power = excess(current.linear.rows, blocks)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
         gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
         known = {item.key: item for item in found}

@@ -17,7 +17,7 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible
     """Solve for the node states with the parameters held, until a step gains next to nothing of log-likelihood."""
     if program.without_nodes:
         return point
-    still, system = np.zeros_like(point.theta), program.linearise(point)
+    still, system = np.zeros_like(point.theta), program.linearise(point, by_theta=False)
     objective, damping = system.objective, 1e-6
     for _ in range(iterations):
         steps = reduce_system(system, damping).node_steps(still)
@@ -32,5 +32,5 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible
         gained, point, objective = objective - after, trial, after
         if gained < nothing:
             break
-        system, damping = program.linearise(point), 0.1 * damping
+        system, damping = program.linearise(point, by_theta=False), 0.1 * damping
     return point

@@ -208,12 +208,17 @@ class Program:
         return [(result, self.output_slopes(k, result, slopes[k], starts[k][1])) for k, result in enumerate(results)]
 
     def _scored(
-        self, point: Point, starts: list[tuple[FloatArray, FloatArray]], derivatives: bool = False
+        self,
+        point: Point,
+        starts: list[tuple[FloatArray, FloatArray]],
+        derivatives: bool = False,
+        by_theta: bool = True,
     ) -> list[tuple[SweepResult, Score]]:
         """Simulate all recordings, comparing with their measurements on the way."""
         requests = [
             replace(
                 self._request(k, point, start, derivatives),
+                by_active=by_theta,
                 yardstick=Yardstick(self.experiments[k].measured, self.noise, self.loss),
             )
             for k, (start, _) in enumerate(starts)
@@ -297,25 +302,30 @@ class Program:
             gradient += slope.T @ errors
         return total, hessian, gradient
 
-    def linearise(self, point: Point) -> Linearisation:
-        """Return objective, gradient and Gauss-Newton Hessian at a point."""
+    def linearise(self, point: Point, by_theta: bool = True) -> Linearisation:
+        """Return objective, gradient and Gauss-Newton Hessian at a point.
+
+        Without `by_theta`, which takes less time, what they are by the parameters means nothing.
+        """
         total, hessian, gradient = self.parameter_terms(point.theta)
         blocks: list[Blocks] = []
         starts = self.measured_starts(point.theta)
-        for index, (result, score) in enumerate(self._scored(point, starts, derivatives=True)):
-            cost, by_theta, slope, block = self._linearise_recording(index, point, (result, score), starts[index][1])
+        for index, (result, score) in enumerate(self._scored(point, starts, True, by_theta)):
+            part = self._linearise_recording(index, point, (result, score), starts[index][1], by_theta)
+            cost, curvature, slope, block = part
             total += cost
-            hessian += by_theta
+            hessian += curvature
             gradient += slope
             blocks.append(block)
         return Linearisation(total if np.isfinite(total) else np.inf, hessian, gradient, tuple(blocks))
 
     def _linearise_recording(
-        self, index: int, point: Point, scored: tuple[SweepResult, Score], start_slope: FloatArray
+        self, index: int, point: Point, scored: tuple[SweepResult, Score], start_slope: FloatArray, by_theta: bool
     ) -> tuple[float, FloatArray, FloatArray, Blocks]:
         (result, score), cut, nodes = scored, self.segments[index], point.nodes[index]
         assert score.gradient is not None and score.square is not None
         _, slope = self.space.numbers_and_slope(point.theta, self.experiments[index].name)
+        slope = slope if by_theta else slope[:0]
         states, count = nodes.shape[1], point.theta.size
         system = NormalEquations.empty(cut.count, states, count)
         system.cost += float(np.sum(score.cost))

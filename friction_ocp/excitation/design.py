@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
@@ -18,10 +17,12 @@ from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare_fit
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.excitation.contest import Contest, contested
 from friction_ocp.excitation.limits import Limits, limits_of, stated_limits
 from friction_ocp.excitation.motions import MOTIONS
 from friction_ocp.excitation.trial_run import TrialRun, refuse_what_is_not_driven, trial_run
-from friction_ocp.excitation.worth import Evidence, evidence, information, known_information
+from friction_ocp.excitation.worth import information, known_information
+from friction_ocp.execution.executor import AbstractExecutor, InProcess
 from friction_ocp.simulation.grid import FloatArray
 
 Criterion = Literal["D", "A", "separation"]
@@ -80,7 +81,7 @@ def design(
     clues = clues_of(base)
     seen = {key: screen(base, entries[key], key[1], clues) for key in dict.fromkeys(between)}
     rivals = [completed(quick_refit(base, item)) for item in _begun(seen)]
-    return replace(separating(base, rivals, tell), between=tuple(between))
+    return replace(separating(base, rivals), between=tuple(between))
 
 
 def _refuse_unknown(between: Sequence[Key], known: Sequence[Key]) -> None:
@@ -129,18 +130,11 @@ def sharpening(fitted: FittedModel, criterion: Criterion, tell: Tell = lambda wh
     return Design(fitted.model.problem, fitted, criterion, limits, tuple(options), _std_errors(known))
 
 
-def separating(base: FittedModel, rivals: Sequence[FittedModel], tell: Tell = lambda what, share: None) -> Design:
+def separating(base: FittedModel, rivals: Sequence[FittedModel], executor: AbstractExecutor = InProcess()) -> Design:
     """Find the motion that tells rivals apart best: the least separation over all pairs, either being true."""
     limits = limits_of(base.model.problem, clues_of(base))
-    options: list[Option] = []
-    by_rival = [{run.motion.name: run for run in _runs(rival, limits, tell)} for rival in rivals]
-    for motion in by_rival[0]:
-        if not all(motion in runs for runs in by_rival):
-            continue
-        pairs = permutations(range(len(rivals)), 2)
-        found: list[Evidence] = [evidence(rivals[k], by_rival[j][motion].recording) for j, k in pairs]
-        least = min(found, key=lambda item: item.separation)
-        options.append(Option(by_rival[0][motion], least.separation, power=least.power))
+    found = contested(Contest.between(base, rivals, limits), executor)
+    options = [Option(run, told.separation, power=told.power) for run, told in found]
     options.sort(key=lambda option: -option.worth)
     errors = _std_errors(known_information(base))
     return Design(base.model.problem, base, "separation", limits, tuple(options), errors)

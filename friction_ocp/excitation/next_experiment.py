@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Tell
+from friction_ocp.diagnosis.diagnose import Diagnosis, Key
 from friction_ocp.diagnosis.select import shown
 from friction_ocp.excitation.design import Design, Option, separating
+from friction_ocp.execution.executor import AbstractExecutor, InProcess
 
 _EXCITATION = {
     "stribeck": "speeds from well below to well above the Stribeck speed, slowly and in both directions",
@@ -51,7 +52,7 @@ class FollowUp:
         return best if best is not None and best.worth >= HOPELESS else None
 
 
-def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> FollowUp | None:
+def follow_up(diagnosis: Diagnosis, executor: AbstractExecutor = InProcess()) -> FollowUp | None:
     """Return what to record to separate the members of the first alias set; None where there is none."""
     if not diagnosis.alias_sets:
         return None
@@ -59,7 +60,7 @@ def follow_up(diagnosis: Diagnosis, tell: Tell = lambda what, share: None) -> Fo
     done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
     rivals = [rival for rival in shown(done.choice.aliases) if rival.key in wanted]
     keys = tuple(rival.key for rival in rivals)
-    design = separating(done.before, [rival.fitted for rival in rivals], tell)
+    design = separating(done.before, [rival.fitted for rival in rivals], executor)
     found = FollowUp(keys, "", design)
     return FollowUp(keys, _text(keys, found.option), design)
 

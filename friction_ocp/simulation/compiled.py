@@ -60,20 +60,20 @@ class CompiledKernel(AbstractKernel):
 
     def _run(self, pieces: Sequence[Piece], threads: int) -> None:
         for group in alike(pieces):
-            table, derivatives = segment_table(group), group[0].request.derivatives
+            table, columns = segment_table(group), group[0].columns
             order = table.order()
             steps, rows = table.steps[order], table.rows[order]
             count = max(1, min(threads, int(steps.sum()) // STEPS_WORTH_A_THREAD))
             cuts = shares(steps, self._lanes, count)
-            works = [(rows[begin:stop], derivatives) for begin, stop in pairwise(cuts) if stop > begin]
+            works = [(rows[begin:stop], columns) for begin, stop in pairwise(cuts) if stop > begin]
             if len(works) > 1:
                 list(_pool(threads).map(self._simulate, works))
             else:
                 self._simulate(works[0])
 
-    def _simulate(self, work: tuple[Addresses, bool]) -> None:
-        rows, derivatives = work
-        self._sweep(ctypes.c_long(len(rows)), ctypes.c_void_p(rows.ctypes.data), ctypes.c_int(derivatives))
+    def _simulate(self, work: tuple[Addresses, int]) -> None:
+        rows, columns = work
+        self._sweep(ctypes.c_long(len(rows)), ctypes.c_void_p(rows.ctypes.data), ctypes.c_int(columns))
 
 
 @cache
@@ -207,7 +207,7 @@ def _c_code(name: str) -> str:
 
 
 MAP = """typedef void (*function)(const lanes *const *, lanes *const *, int);
-typedef void (*chain_rule)(const lanes *, const lanes *, const lanes *, lanes *);
+typedef void (*chain_rule)(const lanes *, const lanes *, const lanes *, lanes *, int);
 typedef struct {
   int unknowns;
   function constants, newton, value, derivative;

@@ -86,7 +86,7 @@ class InterpretedKernel(AbstractKernel):
             track = self._course(request, start, plan.controls)
             into.end[j] = track[: self._states, -1]
             if into.dend is not None:
-                into.dend[j] = self._sensitivities(track[:, -1:])[0]
+                into.dend[j] = self._sensitivities(track[:, -1:])[0, :, : into.dend.shape[2]]
             seen = slice(0, None if closes else -1)
             tracks.append(track[:, plan.node[seen]])
             instants.append(plan.h[seen])
@@ -135,6 +135,7 @@ class InterpretedKernel(AbstractKernel):
             by_state, by_active = (value.reshape(len(value), h.size, -1).transpose(1, 0, 2) for value in values[2:])
             dy = by_state @ self._sensitivities(track)
             dy[:, :, self._states :] += by_active
+            dy = dy if request.by_active else dy[:, :, : self._states]
         if into.dy is not None:
             into.dy[rows] = dy
         if into.score is not None:

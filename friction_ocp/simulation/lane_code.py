@@ -106,8 +106,9 @@ def lane_code(function: ca.Function) -> str:
 def chain_code(name: str, derivative: ca.Function) -> str:
     """Return the C code of the chain rule, out = by_state s + [0, by_active], of a map's derivative (maps.py).
 
-    `static void NAME_s(by_state, by_active, s, out)`: the nonzeros of both Jacobians, then matrices of NC columns, s
-    with NX and out with the rows of the map, column major. NX and NC are defined elsewhere.
+    `static void NAME_s(by_state, by_active, s, out, columns)`: the nonzeros of both Jacobians, then matrices of that
+    many columns, s with NX and out with the rows of the map, column major. NX, which is defined elsewhere, is how many
+    there are where the active parameters are left out.
     """
     by_state, by_active = derivative.sparsity_out(1), derivative.sparsity_out(2)
     count, terms = by_state.size1(), [list[str]() for _ in range(by_state.size1())]
@@ -122,12 +123,14 @@ def chain_code(name: str, derivative: ca.Function) -> str:
     given = ", ".join(f"const lanes *restrict {matrix}" for matrix in matrices)
     return "\n".join(
         (
-            f"static void {name}_s({given}, lanes *restrict out) {{",
-            "for (int c = 0; c < NC; ++c) {",
+            f"static void {name}_s({given}, lanes *restrict out, int columns) {{",
+            "for (int c = 0; c < columns; ++c) {",
             f"const lanes *restrict v = s + c * NX;\nlanes *restrict o = out + c * {count};\n(void)v;",
             *sums,
             "}",
+            "if (columns > NX) {",
             *added,
+            "}",
             "(void)by_state;\n(void)by_active;",
             "}",
             "",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from friction_ocp.drive.stepping import SteppedDrive
+from friction_ocp.simulation.jacobian import jacobian
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,7 @@ class SweepMap:
 
         The torques move with state and parameters as the implicit function theorem says.
         """
-        by_state = self._total(self.arguments[0])
-        by_active = self._total(ca.vertcat(*[self.arguments[2][k] for k in active]))
+        by_state, by_active = self._slopes(self.arguments[0], ca.vertcat(*[self.arguments[2][k] for k in active]))
         arguments = [*self.arguments, *([self.torques] if self.unknowns else [])]
         return ca.Function(f"{self.name}_d", arguments, [ca.densify(self.value), by_state, by_active], {"cse": True})
 
@@ -74,15 +74,19 @@ class SweepMap:
             values += [ca.densify(slope) for slope in slopes]
         return ca.Function(f"{self.name}_s", [*self.arguments, self.torques], values, {"cse": True})
 
-    def _total(self, by: ca.SX) -> ca.SX:
-        if by.numel() == 0:
-            return ca.SX(self.value.numel(), 0)
-        partial = ca.jacobian(self.value, by)
+    def _slopes(self, state: ca.SX, active: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Return the Jacobians of the value by the state and by the active parameters."""
+        by = ca.vertcat(state, active)
+        ends = [state.numel(), by.numel()]
         if not self.unknowns:
-            return partial
-        slope = ca.SX.eye(self.unknowns) - ca.jacobian(self.found, self.torques)
-        moved = ca.solve(slope, ca.jacobian(self.found, by))
-        return partial + ca.mtimes(ca.jacobian(self.value, self.torques), moved)
+            by_state, by_active = ca.horzsplit(jacobian(self.value, by), [0, *ends])
+            return by_state, by_active
+        rows = [0, self.value.numel(), self.value.numel() + self.unknowns]
+        partial = jacobian(ca.vertcat(self.value, self.found), ca.vertcat(by, self.torques))
+        value, found = (ca.horzsplit(part, [0, *ends, partial.size2()]) for part in ca.vertsplit(partial, rows))
+        slope = ca.SX.eye(self.unknowns) - found[2]
+        by_state, by_active = (value[k] + ca.mtimes(value[2], ca.solve(slope, found[k])) for k in range(2))
+        return by_state, by_active
 
     def _function(self, name: str, more: list[ca.SX], values: list[ca.SX]) -> ca.Function:
         return ca.Function(name, [*self.arguments, *more], [ca.densify(value) for value in values], {"cse": True})

@@ -46,13 +46,8 @@ class Parts(AbstractPlan):
         x0 = self.course[self.first[:-1]]
         x0[self._begins] = request.x0
         smaller = replace(request, first=self.first, x0=x0, course=None)
-        found = empty_result(smaller, x0.shape[1], into.y.shape[1], self._columns - x0.shape[1])
+        found = empty_result(smaller, x0.shape[1], into.y.shape[1], self.piece.columns - x0.shape[1])
         return Piece(smaller, replace(found, y=into.y, states=into.states, dy=into.dy))
-
-    @property
-    def _columns(self) -> int:
-        assert self.piece.into.dend is not None
-        return int(self.piece.into.dend.shape[2])
 
     @property
     def _begins(self) -> BoolArray:
@@ -61,7 +56,7 @@ class Parts(AbstractPlan):
 
     def finish(self, found: SweepResult) -> None:
         """Apply the chain rule over the parts."""
-        into, columns, nodes = self.piece.into, self._columns, self.first.copy()
+        into, columns, nodes = self.piece.into, self.piece.columns, self.first.copy()
         assert found.dend is not None and into.dend is not None
         states, chain, nodes[-1] = found.end.shape[1], np.eye(columns), nodes[-1] + 1
         for part, (owner, begins) in enumerate(zip(self.owner, self._begins, strict=True)):

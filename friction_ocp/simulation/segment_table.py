@@ -35,9 +35,9 @@ class SegmentTable:
 def alike(pieces: Sequence[Piece]) -> Iterable[list[Piece]]:
     """Group pieces from which the same is wanted."""
 
-    def wanted(piece: Piece) -> tuple[bool, bool, bool, bool]:
+    def wanted(piece: Piece) -> tuple[int, bool, bool, bool]:
         request = piece.request
-        return request.derivatives, request.with_states, request.yardstick is None, piece.observed
+        return piece.columns, request.with_states, request.yardstick is None, piece.observed
 
     return (list(group) for _, group in groupby(sorted(pieces, key=wanted), key=wanted))
 

@@ -3,7 +3,8 @@
 
    Above this text stand lanes.h, the code of the maps (lane_code.py, from maps.py) and the sizes
      NX NU NP NW NA NY         states, inputs, parameters, widths, active parameters, outputs;
-     NC                        columns of sensitivities: the state at the segment's start, then the active parameters;
+     NC                        most columns of sensitivities: the state at the segment's start, then the active
+                               parameters; a sweep has none of them, the first NX or all;
      NL NK                     most unknown torques, and constants of their equations, of any map;
    then a table of the maps (STEP, OUTPUT and, where there are any, TICK and NOW) and the list DELAYS of the
    parameters that must be 0 for NOW to replace OUTPUT.
@@ -20,9 +21,9 @@
    ticks and writes it.
    resets (n x NX, states from a node on, NaN where they go on) may be NULL.
    Samples (n x NY, NaN where there is none), noise floors and the loss, its kind and parameter (kernel.py), or NULL.
-   course (n x NX, states before the ticks of a node), states (n x NX, after them), y (n x NY) and dy (n x NY x NC) may
-   be NULL; end (NX), dend (NX x NC, column major) with sensitivities; cost, gradient (NC) and square (NC x NC) where
-   there is something to compare with. */
+   course (n x NX, states before the ticks of a node), states (n x NX, after them), y (n x NY) and dy (n x NY x columns)
+   may be NULL; end (NX), dend (NX x columns, column major) with sensitivities; cost, gradient (columns) and square
+   (columns x columns) where there is something to compare with. */
 typedef struct {
   long n, closes;
   const double *dt;
@@ -37,14 +38,15 @@ typedef struct {
 typedef struct {
   const segment *at[LANES];
   const map *output;
-  int live, derivatives;
+  int live, columns; /* columns of sensitivities; 0 without derivatives */
   mask writing; /* lanes that write the node that they are at */
-  lanes x[NX + 1], s[NX * NC + 1], u[NU + 1], held[NU + 1], p[NP + 1], width[NW + 1], h;
+  lanes x[NX + 1], u[NU + 1], held[NU + 1], p[NP + 1], width[NW + 1], h;
   lanes step_torques[NL + 1], output_torques[NL + 1];
   lanes cost, gradient[NC + 1], square[NC * NC + 1];
   const lanes *arg[7];
   lanes *res[3];
-  lanes value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], moved[(NX + NY) * NC + 1], constants[NK + 1];
+  lanes value[NX + NY + NL], a[(NX + NY) * NX + 1], b[(NX + NY) * NA + 1], constants[NK + 1];
+  lanes sensitivities[2][(NX + NY) * NC + 1], *s, *moved; /* those of the state, and what a map makes of them */
 } group;
 
 /* Solve for the unknown torques of a map in some lanes from where they were last; now->arg holds the arguments. */
@@ -73,21 +75,18 @@ static void evaluate(const map *m, mask some, lanes *torques, int derivatives, g
   (derivatives ? m->derivative : m->value)(now->arg, now->res, now->live);
 }
 
-static void replace(int count, const lanes *from, lanes *into, mask where, int everywhere) {
-  if (everywhere) memcpy(into, from, sizeof(lanes) * (size_t)count);
-  for (int i = 0; i < count && !everywhere; ++i) into[i] = blend(where, from[i], into[i]);
-}
-
 /* Advance states and sensitivities of some lanes by a map under inputs; now->arg holds its other arguments. */
 static void advance(const map *m, mask some, const lanes *inputs, group *now) {
   int all = !any(~some);
   now->arg[1] = inputs;
-  evaluate(m, some, now->step_torques, now->derivatives, now);
-  if (now->derivatives) {
-    m->chain(now->a, now->b, now->s, now->moved);
-    replace(NX * NC, now->moved, now->s, some, all);
+  evaluate(m, some, now->step_torques, now->columns, now);
+  if (now->columns) {
+    lanes *before = now->s;
+    m->chain(now->a, now->b, before, now->moved, now->columns);
+    for (int i = 0; i < NX * now->columns && !all; ++i) now->moved[i] = blend(some, now->moved[i], before[i]);
+    now->s = now->moved, now->moved = before;
   }
-  replace(NX, now->value, now->x, some, all);
+  for (int i = 0; i < NX; ++i) now->x[i] = all ? now->value[i] : blend(some, now->value[i], now->x[i]);
 }
 
 /* A row of a table (n x columns) of each segment, at its node k or its last. */
@@ -142,7 +141,7 @@ static inline double cost_of(const double *loss, double r, double *weight) {
   }
 }
 
-/* Compare output i at node k; with derivatives its sensitivities are in now->moved (NY x NC, column major). */
+/* Compare output i at node k; with derivatives its sensitivities are in now->moved (NY x columns, column major). */
 static void compare(long k, int i, group *now) {
   lanes weight = splat(0.0), error = splat(0.0), scale = splat(0.0), v[NC + 1];
   int compared = 0;
@@ -156,9 +155,9 @@ static void compare(long k, int i, group *now) {
     now->cost[lane] += cost_of(at->loss, error[lane], &how_much);
     weight[lane] = how_much;
   }
-  if (!compared || !now->derivatives) return;
-  for (int c = 0; c < NC; ++c) v[c] = pick((mask)(scale != 0.0), now->moved[c * NY + i] * scale);
-  for (int c = 0; c < NC; ++c) {
+  if (!compared || !now->columns) return;
+  for (int c = 0; c < now->columns; ++c) v[c] = pick((mask)(scale != 0.0), now->moved[c * NY + i] * scale);
+  for (int c = 0; c < now->columns; ++c) {
     lanes pull = weight * v[c], *row = now->square + c * NC;
     now->gradient[c] += pull * error;
     for (int d = 0; d <= c; ++d) row[d] += pull * v[d];
@@ -168,21 +167,21 @@ static void compare(long k, int i, group *now) {
 /* Write or compare what is seen at node k. */
 static void observe(long k, group *now) {
   const segment *first = now->at[0];
-  int derivatives = now->derivatives && (first->dy || first->measured);
+  int columns = now->columns, derivatives = columns && (first->dy || first->measured);
   for (int i = 0; i < now->live; ++i)
     if (now->writing[i] && now->at[i]->states)
       for (int j = 0; j < NX; ++j) now->at[i]->states[k * NX + j] = now->x[j][i];
   if (!first->y || NY == 0) return;
   now->arg[1] = now->held;
   evaluate(now->output, now->writing, now->output_torques, derivatives, now);
-  if (derivatives) now->output->chain(now->a, now->b, now->s, now->moved);
+  if (derivatives) now->output->chain(now->a, now->b, now->s, now->moved, columns);
   for (int i = 0; i < now->live; ++i) {
     const segment *at = now->at[i];
     if (!now->writing[i]) continue;
     for (int j = 0; j < NY; ++j) at->y[k * NY + j] = now->value[j][i];
     if (derivatives && at->dy)
       for (int j = 0; j < NY; ++j)
-        for (int c = 0; c < NC; ++c) at->dy[(k * NY + j) * NC + c] = now->moved[c * NY + j][i];
+        for (int c = 0; c < columns; ++c) at->dy[(k * NY + j) * columns + c] = now->moved[c * NY + j][i];
   }
   if (first->measured)
     for (int i = 0; i < NY; ++i) compare(k, i, now);
@@ -220,24 +219,26 @@ static void begin(group *now) {
   memset(now->step_torques, 0, sizeof now->step_torques);
   memset(now->output_torques, 0, sizeof now->output_torques);
   now->cost = splat(0.0);
-  if (!now->derivatives) return;
-  memset(now->s, 0, sizeof now->s);
+  if (!now->columns) return;
+  now->s = now->sensitivities[0], now->moved = now->sensitivities[1];
+  memset(now->s, 0, sizeof now->sensitivities[0]);
   for (int i = 0; i < NX; ++i) now->s[i * NX + i] = splat(1.0);
   memset(now->gradient, 0, sizeof now->gradient);
   memset(now->square, 0, sizeof now->square);
 }
 
 static void finish(const group *now) {
+  int columns = now->columns;
   for (int i = 0; i < now->live; ++i) {
     const segment *at = now->at[i];
     for (int j = 0; j < NX; ++j) at->end[j] = now->x[j][i];
-    if (now->derivatives)
-      for (int j = 0; j < NX * NC; ++j) at->dend[j] = now->s[j][i];
+    if (columns)
+      for (int j = 0; j < NX * columns; ++j) at->dend[j] = now->s[j][i];
     if (!at->measured) continue;
     *at->cost = now->cost[i];
-    for (int c = 0; c < NC && now->derivatives; ++c) {
+    for (int c = 0; c < columns; ++c) {
       at->gradient[c] = now->gradient[c][i];
-      for (int d = 0; d <= c; ++d) at->square[c * NC + d] = at->square[d * NC + c] = now->square[c * NC + d][i];
+      for (int d = 0; d <= c; ++d) at->square[c * columns + d] = at->square[d * columns + c] = now->square[c * NC + d][i];
     }
   }
 }
@@ -273,11 +274,11 @@ static const map *output_map(const double *p) {
 SWEEP_EXPORT int friction_ocp_lanes(void) { return LANES; }
 
 /* Simulate segments, those that stand beside each other side by side: the more alike their lengths, the better. All of
-   them have the same NULLs. */
-SWEEP_EXPORT void friction_ocp_sweep(long count, const segment *segments, int derivatives) {
+   them have the same NULLs. `columns` of sensitivities: 0, NX or NC. */
+SWEEP_EXPORT void friction_ocp_sweep(long count, const segment *segments, int columns) {
   for (long done = 0; done < count;) {
     group now;
-    now.derivatives = derivatives;
+    now.columns = columns;
     now.output = output_map(segments[done].p);
     for (now.live = 0; now.live < LANES && done + now.live < count; ++now.live) {
       if (output_map(segments[done + now.live].p) != now.output) break;

@@ -10,11 +10,15 @@ import yaml
 from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, plain_drive, write_case
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 
+from friction_ocp.diagnosis.aside import OtherReadings
+from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
 from friction_ocp.diagnosis_document import diagnosis_document
+from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.statistics.execution import Execution
 
 TICK, LOGGED, SECONDS, STIFFNESS = 1e-3, 0.01, 4.0, 3.0
 DAMPED = 30.0 * VISCOUS
@@ -82,3 +86,19 @@ def test_a_held_goal_is_no_lag(tmp_path: Path) -> None:
     seen = diagnose(load_problem(servo(tmp_path)))
     assert seen.verdict == "no_gap"
     assert any(text.startswith("goal: is held") for text in diagnosis_document(seen)["assumptions"])
+
+
+def test_what_was_fitted_beside_the_refits_is_what_is_fitted_when_asked_for(tmp_path: Path) -> None:
+    """The base model of another reading is the same, be it the work of a task before or of whoever asks."""
+    path = write_case(tmp_path, axis(law="stribeck", tau_s=0.15, omega_s=6.0))
+    problem = load_problem(path)
+    bench = open_bench(problem, Execution(InProcess()))
+    kept = OtherReadings(problem)
+    tasks = kept.tasks(bench)
+    kept.keep(bench, [task.function(bench, *task.arguments) for task in tasks])
+    asked = OtherReadings(problem).fitted(bench.base)
+    assert len(tasks) == len(asked) > 0
+    for (read, base), (same, expected) in zip(kept.fitted(bench.base), asked, strict=True):
+        assert read.drive == same.drive
+        np.testing.assert_allclose(base.theta, expected.theta, rtol=1e-12)
+        assert base.objective == pytest.approx(expected.objective, rel=1e-12)

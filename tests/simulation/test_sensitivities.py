@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sweep_cases import DRIVES, Case
 
+from friction_ocp.simulation.interpreted import InterpretedKernel
 from friction_ocp.simulation.kernel import SweepRequest, SweepResult
 from friction_ocp.simulation.sweep import Sweep
 
@@ -79,3 +80,20 @@ def test_segments_that_meet_are_one_run() -> None:
     parts = sweep.run_many([replace(cut, x0=x0)])[0]
     np.testing.assert_allclose(parts.y, whole.y, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(parts.end[-1], whole.end[0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize("compiled", [True, False])
+def test_derivatives_by_start_states_alone_are_the_first_columns(name: str, compiled: bool) -> None:
+    """Without the active parameters nothing changes but that their columns are not there."""
+    case = Case(DRIVES[name]())
+    request = case.request(np.random.default_rng(3))
+    sweep = Sweep(case.model, case.active)
+    if not compiled:
+        sweep.kernel = InterpretedKernel(case.model, case.active)
+    whole, part = sweep.run_many([request, replace(request, by_active=False)])
+    states = len(case.model.state_names)
+    for all_columns, some in ((whole.dy, part.dy), (whole.dend, part.dend)):
+        assert all_columns is not None and some is not None
+        assert np.array_equal(all_columns[:, :, :states], some)
+    assert np.array_equal(whole.y, part.y)
