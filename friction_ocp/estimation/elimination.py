@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.program import Blocks, Linearisation
 from friction_ocp.simulation.grid import FloatArray
+
+linalg: Any = _linalg
 
 
 @dataclass(frozen=True)
@@ -59,15 +63,34 @@ def _eliminate(blocks: Blocks, damping: float) -> Eliminated:
     diagonal[:, index, index] *= 1.0 + damping
     diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
     joined = bool(np.any(blocks.node_next))
-    solved = _cyclic_reduction(diagonal, blocks.node_next, right) if joined else _solve(diagonal, right)
+    solved = _chained(diagonal, blocks.node_next, right) if joined else _solve(diagonal, right)
     return Eliminated(solved[:, :, 0], solved[:, :, 1:])
 
 
-def _cyclic_reduction(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve a symmetric positive block-tridiagonal system: every other block at once, then what is left.
+def _chained(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a symmetric block-tridiagonal system, by Cholesky's method where it is positive definite.
 
-    `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s, k). Source: Golub, Van Loan,
-    Matrix Computations, 4.5.4.
+    `diagonal` (n, s, s), `upper` (n - 1, s, s) right of the diagonal, `right` (n, s, k).
+    """
+    count, states, columns = right.shape
+    band = np.zeros((2 * states, count, states))
+    for row in range(states):
+        for column in range(states):
+            if row <= column:
+                band[2 * states - 1 + row - column, :, column] = diagonal[:, row, column]
+            band[states - 1 + row - column, 1:, column] = upper[:, row, column]
+    flat = (band.reshape(2 * states, -1), right.reshape(-1, columns))
+    try:
+        solved: FloatArray = np.asarray(linalg.solveh_banded(*flat, overwrite_ab=True, check_finite=False))
+        return solved.reshape(right.shape)
+    except np.linalg.LinAlgError:
+        return _cyclic_reduction(diagonal, upper, right)
+
+
+def _cyclic_reduction(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve a symmetric block-tridiagonal system: every other block at once, then what is left.
+
+    Rounding may have taken the last digit that made it positive. Source: Golub, Van Loan, Matrix Computations, 4.5.4.
     """
     if len(diagonal) == 1:
         return _solve(diagonal, right)
