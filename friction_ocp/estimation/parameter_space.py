@@ -18,7 +18,7 @@ from friction_ocp.parameters import Free, Leaf, Tie, is_off
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 ROUNDING = 1e-9
-"""Distance from a bound over that of the bounds at which a parameter is there."""
+"""Distance from a bound over that of the bounds, or over a parameter's size, at which a parameter is there."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class ParameterSpace:
 
     def ends(self, theta: FloatArray) -> tuple[BoolArray, BoolArray]:
         """Return which parameters are at their lower and which at their upper bound but for rounding."""
-        span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, 0.0)
+        span = np.where(np.isfinite(self.upper - self.lower), self.upper - self.lower, self.scale)
         return theta - self.lower <= ROUNDING * span, self.upper - theta <= ROUNDING * span
 
     def moved(self, start: FloatArray) -> ParameterSpace:

@@ -8,7 +8,7 @@ import numpy as np
 from friction_ocp.simulation.grid import FloatArray
 
 ROUNDING = 1e-12
-"""Distance to a bound over that between both, below which a step ends on it."""
+"""Distance to a bound over that between both, or over the way to the only one, below which a step ends on it."""
 
 
 def linear_constraints(constraints: ca.Function | None, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -44,8 +44,14 @@ def bounded_step(
     a, b = np.concatenate(normals).reshape(-1, count), np.concatenate(offsets)
     sizes = np.maximum(np.linalg.norm(a, axis=1), 1e-300)
     step = scale * _dual_active_set(inverse, free, a / sizes[:, None], b / sizes)
-    near = np.where(np.isfinite(upper - lower), ROUNDING * (upper - lower), 0.0)
-    return np.where(step - lower <= near, lower, np.where(upper - step <= near, upper, step))
+    low, high = (ROUNDING * _distance(bound, upper - lower) for bound in (lower, upper))
+    return np.where(step - lower <= low, lower, np.where(upper - step <= high, upper, step))
+
+
+def _distance(bound: FloatArray, span: FloatArray) -> FloatArray:
+    """Return how far apart both bounds are, or how far away the only one is; 0 where there is no bound."""
+    alone = np.where(np.isfinite(bound), np.abs(bound), 0.0)
+    return np.where(np.isfinite(span), span, alone)
 
 
 def _is_within(step: FloatArray, lower: FloatArray, upper: FloatArray, rows: FloatArray, margins: FloatArray) -> bool:

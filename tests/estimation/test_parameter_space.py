@@ -127,6 +127,13 @@ def test_clipping_moves_to_the_nearest_allowed_point() -> None:
     assert space.clip(np.array([-2.0, -7.0])).tolist() == [0.0, 0.0]
 
 
+def test_what_rounding_keeps_off_a_bound_is_on_it() -> None:
+    """Be there another bound or none: a parameter that can go no further informs of nothing beyond."""
+    space = space_of(problem(axis(CoulombViscous(Free(0.1, 0.0, 1.0), Free(0.01, 0.0)))))
+    assert [end.tolist() for end in space.ends(np.array([1e-12, 1e-13]))] == [[True, True], [False, False]]
+    assert [end.tolist() for end in space.ends(np.array([1.0, 1e-4]))] == [[False, False], [True, False]]
+
+
 def test_scales_are_typical_sizes() -> None:
     """The guess, a share of the bounds where it is zero, and ten prior deviations where those are smaller."""
     law = CoulombViscous(Free(0.0, -1.0, 1.0), Free(5.0, prior_std=0.01))
