@@ -26,7 +26,7 @@ class OtherReadings:
     """The end of the stated base model from which what was found begins."""
     _found: list[Json] = field(default_factory=list[Json])
 
-    def tasks(self, bench: Bench) -> list[Task]:
+    def tasks(self) -> list[Task]:
         """Return what fits the base model of a bench to all other readings; no part of the effort of a search."""
         return [Task(f"read-otherwise-{k}", read_base, (k,)) for k in range(len(other_readings(self.problem)))]
 

@@ -94,7 +94,7 @@ class Crew:
         simulation breaks down on the way are left out.
         """
         tasks = [Task(f"{self.number}-held-out", held_out_costs)]
-        aside = [] if self.readings is None else self.readings.tasks(self.bench)
+        aside = [] if self.readings is None else self.readings.tasks()
         tasks += aside  # takes longer than a refit, mostly, and what takes long comes first
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
         tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]

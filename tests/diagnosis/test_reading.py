@@ -94,7 +94,7 @@ def test_what_was_fitted_beside_the_refits_is_what_is_fitted_when_asked_for(tmp_
     problem = load_problem(path)
     bench = open_bench(problem, Execution(InProcess()))
     kept = OtherReadings(problem)
-    tasks = kept.tasks(bench)
+    tasks = kept.tasks()
     kept.keep(bench, [task.function(bench, *task.arguments) for task in tasks])
     asked = OtherReadings(problem).fitted(bench.base)
     assert len(tasks) == len(asked) > 0
