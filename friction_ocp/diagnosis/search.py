@@ -280,8 +280,6 @@ class Search:
         crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share), aside)
         enough = required(bench.base, current) if meant.names else np.inf
         again = shapes(current, bench.clues, accepted)
-        if not meant.names:  # what leaves only noise needs no shape beyond a more general one
-            again = [key for key in again if accepted.count(key) == 1]
         keys = [*places(current, meant), *again]
         found = crew.screened(keys)
         hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]

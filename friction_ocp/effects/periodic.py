@@ -25,7 +25,7 @@ from friction_ocp.effects.effect import (
 )
 from friction_ocp.effects.friction_curve import SHARE, is_dry
 from friction_ocp.friction.modifiers import Ripple
-from friction_ocp.friction.wave import OVERTONES, Wave
+from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, start_of
 
 
@@ -48,9 +48,9 @@ SAME_PERIOD = 0.1
 
 
 def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
-    """Return a wave with free overtones, at a half to a quarter of its period, their off values and a trial."""
+    """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
     size = _further_size(part, path, clues)
-    names = [f"{order}_{kind}" for order in OVERTONES for kind in ("cosine", "sine")]
+    names = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
     paths = [f"{path}.{name}" for name in names]
     trial = Trial(tuple({name: size} for name in paths))
     return replace(part, **dict.fromkeys(names, either_way(size))), dict.fromkeys(paths, 0.0), (trial,)
@@ -70,9 +70,9 @@ def _further_size(part: Any, path: str, clues: Clues) -> float:
 
 
 class AbstractWaveEffect(AbstractEffect):
-    """A wave that a part of the drive lacks; once one was accepted, with overtones and a wave of another period.
+    """A wave that a part of the drive lacks; once one was accepted, with overtones or a wave of another period.
 
-    Which of both comes first, the strongest period of what is still missing says.
+    Which of both, the strongest period of what is still missing says.
     """
 
     kind: ClassVar[type[Wave]]
@@ -96,15 +96,13 @@ class AbstractWaveEffect(AbstractEffect):
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         plain, path = self.there(drive, place)
-        if plain is None or (plain.has_overtones and plain.has_other):
+        if plain is None or plain.has_overtones or plain.has_other:
             return None
         period = clues.numbers.get(f"{path}.period", start_of(plain.period))
-        known = [period, *(period / order for order in OVERTONES.values())]
-        found = [] if plain.has_other else self.size_and_periods(drive, place, clues)[1]
+        known = [period / order for order in (1, 2, 3)]
+        found = self.size_and_periods(drive, place, clues)[1]
         strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
-        if plain.has_overtones and not strange:
-            return None
-        if plain.has_overtones or (strange and strange[0] == found[0]):
+        if strange and strange[0] == found[0]:
             part, off, trials = other_wave(plain, path, clues, strange)
         else:
             part, off, trials = overtones(plain, path, clues)

@@ -9,9 +9,6 @@ from typing import Any
 from friction_ocp.friction.smoothing import cos, sin, sinc
 from friction_ocp.parameters import Value, is_off, quantity
 
-OVERTONES = {"second": 2, "third": 3, "fourth": 4}
-"""Names of the orders beside the first, as they begin the names of their numbers."""
-
 
 @dataclass(frozen=True)
 class Wave:
@@ -28,8 +25,6 @@ class Wave:
     second_sine: Value = None
     third_cosine: Value = None
     third_sine: Value = None
-    fourth_cosine: Value = None
-    fourth_sine: Value = None
     other_cosine: Value = None
     other_sine: Value = None
     other_period: Value = None
@@ -42,7 +37,7 @@ class Wave:
         parts = ("cosine", "sine")
         numbers = {part: quantity(kind, f"{part} part of {of}") for part in parts}
         numbers["period"] = quantity(over, f"period of {period}", nested="guess")
-        for order in OVERTONES:
+        for order in ("second", "third"):
             meaning = {part: f"{part} part of the {order} order of {of}" for part in parts}
             numbers |= {f"{order}_{part}": quantity(kind, meaning[part], None) for part in parts}
         numbers |= {f"other_{part}": quantity(kind, f"{part} part of a further wave of {of}", None) for part in parts}
@@ -58,22 +53,22 @@ class Wave:
 
     @property
     def has_overtones(self) -> bool:
-        """Whether it has an order beside the first."""
-        return any(part is not None for name in OVERTONES for part in self._parts(name))
+        """Whether it has a second or third order."""
+        orders = (self.second_cosine, self.second_sine, self.third_cosine, self.third_sine)
+        return any(part is not None for part in orders)
 
     @property
     def has_other(self) -> bool:
         """Whether it has a wave of another period."""
         return self.other_cosine is not None or self.other_sine is not None
 
-    def _parts(self, name: str) -> tuple[Any, Any]:
-        """Return cosine and sine part of an order, or of the wave of another period, by its name."""
-        return getattr(self, f"{name}_cosine"), getattr(self, f"{name}_sine")
-
     def _terms(self) -> list[tuple[int, Any, Any, Any]]:
         """Return order, period of the first order, cosine part and sine part of what there is."""
-        further = [(order, self.period, *self._parts(name)) for name, order in OVERTONES.items()]
-        further.append((1, self.other_period, *self._parts("other")))
+        further = [
+            (2, self.period, self.second_cosine, self.second_sine),
+            (3, self.period, self.third_cosine, self.third_sine),
+            (1, self.other_period, self.other_cosine, self.other_sine),
+        ]
         found: list[tuple[int, Any, Any, Any]] = [(1, self.period, self.cosine, self.sine)]
         for order, period, *parts in further:
             if any(part is not None for part in parts):
