@@ -132,7 +132,8 @@ def _leverage_limit(told: FloatArray, part: FloatArray) -> float:
 def _blocks(found: Influence) -> list[IntArray]:
     """Return the rows of blocks of neighbouring residuals: several correlation lengths, or whole free runs.
 
-    The errors of a free run go on to its end, and into none that starts afresh.
+    The errors of a free run go on to its end, and into none that starts afresh. A few residuals of which none tells of
+    the next, such as those of static points, stand each for itself.
     """
     places = [np.flatnonzero(found.recording == index) for index in np.unique(found.recording)]
     runs: list[list[IntArray]] = [np.split(rows, np.flatnonzero(np.diff(found.window[rows])) + 1) for rows in places]
@@ -140,12 +141,21 @@ def _blocks(found: Influence) -> list[IntArray]:
     blocks: list[IntArray] = []
     for rows, own in zip(places, runs, strict=True):
         wanted = max(int(np.clip(rows.size / (4.0 * length), MIN_BLOCKS / len(places), MAX_BLOCKS)), 2)
+        if rows.size <= MAX_BLOCKS and not _tells_of_the_next(found.score_weight[rows]):
+            wanted = rows.size
         if apart and len(own) > 1:
             cuts = np.linspace(0, len(own), min(wanted, len(own)) + 1).astype(int)
             blocks += [np.concatenate(own[begin:end]) for begin, end in pairwise(cuts)]
         else:
             blocks += np.array_split(rows, wanted)
     return blocks
+
+
+def _tells_of_the_next(values: FloatArray) -> bool:
+    """Whether neighbours among some values are alike, beyond what chance makes of independent ones."""
+    r = values - values.mean()
+    alike = float(r[1:] @ r[:-1]) / max(float(r @ r), 1e-300)
+    return alike * np.sqrt(r.size) > float(stats.norm.ppf(CONFIDENCE))
 
 
 def _correlation_rows(found: Influence) -> float:

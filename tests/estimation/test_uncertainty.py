@@ -108,6 +108,21 @@ def test_few_independent_stretches_make_wide_intervals() -> None:
     assert np.mean(hits) > 0.85
 
 
+def test_a_few_points_that_do_not_tell_of_one_another_stand_each_for_itself() -> None:
+    """Twenty points of a polyline, a few behind its break: intervals cover, and are no wider than it takes."""
+    speed = np.linspace(0.0, 2.0, 20)
+    x = np.column_stack([np.ones(20), speed, np.maximum(speed - 1.2, 0.0)])
+    variances, hits = [], []
+    for seed in range(200):
+        moved, noise = refitted(x, np.random.default_rng(seed).standard_normal(20))
+        found = judged(x, noise, white=False)
+        low, high = found.interval(moved).T
+        variances.append(np.diag(found.covariance))
+        hits.append((low <= 0.0) & (high >= 0.0))
+    assert np.mean(variances, axis=0) == pytest.approx(np.diag(np.linalg.inv(x.T @ x)), rel=2.0 * SCATTER)
+    assert np.mean(hits) > 0.92
+
+
 def test_a_block_that_tells_most_is_left_out_as_far_as_others_tell() -> None:
     """A tenth of the rows holds most information: leaving it out moves the estimate by far more than its score."""
     rows, rng = 2000, np.random.default_rng(9)
