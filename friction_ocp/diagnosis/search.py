@@ -117,9 +117,8 @@ class Search:
         if len(set(self.accepted)) > 1 and innovations(self.bench.current).significant(self.level):
             current, self.accepted = without_small(self.bench, self.accepted)
             self.bench = self.bench.at(current)
-        if self.accepted and not self._helps():
-            self.taken_back += [item for item in self.rounds if item.accepted is not None]
-            self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(self.rounds[0])], []
+        if self.accepted and not self._helps(self.bench):
+            self._withdraw()
 
     def _seems_missing(self, first: Round) -> bool:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
@@ -238,25 +237,40 @@ class Search:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()
 
-    def _left_out(self) -> tuple[FreeErrors, FreeErrors]:
-        """Return free runs where recordings took no part, of the base model and of the current one."""
-        if self._compared is None or self._compared[0] is not self.bench.current:
-            self._compared = (self.bench.current, *left_out_before_and_after(self.bench, self.run))
+    def _left_out(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
+        """Return free runs where recordings took no part, of the base model and of the current one of a bench."""
+        if self._compared is None or self._compared[0] is not bench.current:
+            self._compared = (bench.current, *left_out_before_and_after(bench, self.run))
         return self._compared[1:]
 
-    def _helps(self) -> bool:
+    def _withdraw(self) -> None:
+        """Take back what does not help, for what the recordings could not tell from the first addition and does.
+
+        What comes nearest where it was fitted need not be what carries over.
+        """
+        first, tried = self.rounds[0], set(self.accepted)
+        self.taken_back += [item for item in self.rounds if item.accepted is not None]
+        for rival in shown(first.choice.aliases):
+            bench = self.bench.at(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
+            if rival.key not in tried and self._helps(bench):
+                held = replace(first, choice=with_first(first.choice, rival), accepted=rival)
+                self.bench, self.rounds, self.accepted = bench, [held], [rival.key]
+                return
+        self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(first)], []
+
+    def _helps(self, bench: Bench) -> bool:
         """Whether what was added leaves nothing, or takes a part and makes free runs of training recordings left out
         better.
 
         Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
         runs that are lost say nothing.
         """
-        base, current = self.bench.base, self.bench.current
+        base, current = bench.base, bench.current
         if not innovations(current).significant(self.level):
             return True
         if base.cost - current.cost < PART * (base.cost - 0.5 * samples(base)):
             return False
-        before, after = self._left_out()
+        before, after = self._left_out(bench)
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 
     def _falls_short(self) -> bool:
@@ -264,7 +278,7 @@ class Search:
 
         Small slow torques hide below the noise of samples and yet move the drive.
         """
-        before, after = self._left_out()
+        before, after = self._left_out(self.bench)
         return not before.lost and not after.drowned and after.excess() > PART * before.excess()
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
