@@ -207,12 +207,15 @@ class Search:
     def _take(self, rival: Rival) -> None:
         """Add what a round has found; drop or exchange earlier additions that it makes superfluous."""
         self.tell("examining earlier additions again", 0.0)
-        fitted = freed(rival.fitted) if rival.fitted.astray else rival.fitted
-        bench, keys = self.bench.at(fitted), [*self.accepted, rival.key]
+        bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
         self.bench = bench.at(current)
         if innovations(current).significant(self.level) and not self._exhausted():
             self._exchange()
+
+    def _with(self, rival: Rival) -> Bench:
+        """Return the bench of a rival's model: one that is far off is freed only now that it is to be accepted."""
+        return self.bench.at(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
 
     def _exchange(self) -> None:
         found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)
@@ -251,8 +254,10 @@ class Search:
         first, tried = self.rounds[0], set(self.accepted)
         self.taken_back += [item for item in self.rounds if item.accepted is not None]
         for rival in shown(first.choice.aliases):
-            bench = self.bench.at(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
-            if rival.key not in tried and self._helps(bench):
+            if rival.key in tried:
+                continue
+            bench = self._with(rival)
+            if self._helps(bench):
                 held = replace(first, choice=with_first(first.choice, rival), accepted=rival)
                 self.bench, self.rounds, self.accepted = bench, [held], [rival.key]
                 return

@@ -19,7 +19,7 @@ from friction_ocp.excitation.trial_run import TrialRun, trial_run
 from friction_ocp.excitation.worth import Evidence, evidence
 from friction_ocp.execution.executor import AbstractExecutor
 from friction_ocp.execution.plain import plain, restored
-from friction_ocp.execution.run import run_tasks
+from friction_ocp.execution.run import Watch, run_tasks, unwatched
 from friction_ocp.execution.task import Json, Task
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -53,10 +53,12 @@ class Contest:
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
 
-def contested(contest: Contest, executor: AbstractExecutor) -> list[tuple[TrialRun, Evidence]]:
+def contested(
+    contest: Contest, executor: AbstractExecutor, watch: Watch = unwatched
+) -> list[tuple[TrialRun, Evidence]]:
     """Return the motions that all rivals can make, as the first makes them, with the least evidence over all pairs."""
     tasks = [Task(f"motion-{k}", contest_over, (k,)) for k in range(len(MOTIONS))]
-    outcomes = run_tasks("motions that separate candidates", tasks, contest, "", executor)
+    outcomes = run_tasks("motions that separate candidates", tasks, contest, "", executor, watch=watch)
     values = [value_of(outcome) for outcome in outcomes.values()]
     return [_restored(k, value) for k, value in enumerate(values) if value is not None]
 

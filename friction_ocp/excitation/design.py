@@ -23,6 +23,7 @@ from friction_ocp.excitation.motions import MOTIONS
 from friction_ocp.excitation.trial_run import TrialRun, refuse_what_is_not_driven, trial_run
 from friction_ocp.excitation.worth import information, known_information
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
+from friction_ocp.execution.run import Tally
 from friction_ocp.simulation.grid import FloatArray
 
 Criterion = Literal["D", "A", "separation"]
@@ -81,7 +82,7 @@ def design(
     clues = clues_of(base)
     seen = {key: screen(base, entries[key], key[1], clues) for key in dict.fromkeys(between)}
     rivals = [completed(quick_refit(base, item)) for item in _begun(seen)]
-    return replace(separating(base, rivals), between=tuple(between))
+    return replace(separating(base, rivals, tell=tell), between=tuple(between))
 
 
 def _refuse_unknown(between: Sequence[Key], known: Sequence[Key]) -> None:
@@ -130,10 +131,19 @@ def sharpening(fitted: FittedModel, criterion: Criterion, tell: Tell = lambda wh
     return Design(fitted.model.problem, fitted, criterion, limits, tuple(options), _std_errors(known))
 
 
-def separating(base: FittedModel, rivals: Sequence[FittedModel], executor: AbstractExecutor = InProcess()) -> Design:
+def separating(
+    base: FittedModel,
+    rivals: Sequence[FittedModel],
+    executor: AbstractExecutor = InProcess(),
+    tell: Tell = lambda what, share: None,
+) -> Design:
     """Find the motion that tells rivals apart best: the least separation over all pairs, either being true."""
     limits = limits_of(base.model.problem, clues_of(base))
-    found = contested(Contest.between(base, rivals, limits), executor)
+
+    def watch(tally: Tally) -> None:
+        tell(tally.what, tally.done / max(tally.total, 1))
+
+    found = contested(Contest.between(base, rivals, limits), executor, watch)
     options = [Option(run, told.separation, power=told.power) for run, told in found]
     options.sort(key=lambda option: -option.worth)
     errors = _std_errors(known_information(base))
