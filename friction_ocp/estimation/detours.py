@@ -9,16 +9,19 @@ import numpy as np
 from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
+from friction_ocp.estimation.growth import joined_at_no_cost
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
-from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, is_same_end, limits
-from friction_ocp.estimation.stages import ROUNDINGS, keeps_the_loss, mean_error
+from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, is_same_end, limits, windowed
+from friction_ocp.estimation.stages import ROUNDINGS, is_noise, keeps_the_loss, mean_error
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
+WINDOWS = 8
+"""Windows of each free run on the way around an end that only a run over all of it has."""
 HOPS = (0.005, 0.02, 0.05)
 """Restarts around the best end of a loss with kinks, in turn: by what share the quadratic model calls them worse."""
 BETTER = 1e-6
@@ -56,7 +59,32 @@ def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         end = final_solver(model)(program, between.point, limits(model), watch)
         iterations = best.iterations + between.iterations + end.iterations
         best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
-    return replace(fitted, solution=best)
+    return rejoined(model, replace(fitted, solution=best), phases)
+
+
+def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
+    """Leave an end near the noise that costs more than starts of windows explain: through these windows, and back.
+
+    Each stick and slip of a long run makes ends of its own, and shorter runs have fewer. For a right model the windows
+    gain no more than their free starts do, and it stays where it is.
+    """
+    program, best = fitted.program, fitted.solution
+    if not is_noise(program, best):
+        return fitted
+    span = max(float(item.grid.time[-1] - item.grid.time[0]) for item in program.experiments) / WINDOWS
+    cut = windowed(span)(model, program.width, program.loss)
+    watch = phases.begin(f"free runs over {span:.3g} s")
+    between = solve_gauss_newton(cut, _anew(cut, best.point), FINE, watch)
+    if joined_at_no_cost(Fitted(between, cut), fitted):
+        return fitted
+    end = final_solver(model)(program, _anew(program, between.point), limits(model), watch)
+    iterations = best.iterations + between.iterations + end.iterations
+    return replace(fitted, solution=replace(min(best, end, key=lambda item: item.objective), iterations=iterations))
+
+
+def _anew(program: Program, point: Point) -> Point:
+    """Return the parameters with the nodes that another program suggests for them."""
+    return Point(point.theta, program.suggested_nodes(point.theta))
 
 
 def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:

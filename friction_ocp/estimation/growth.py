@@ -107,7 +107,7 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
         start = _better_start(model, program, program.point_along(fitted.program, fitted.solution.point))
         solution = final_solver(model)(program, start, limits(model), watch)
         fitted = Fitted(replace(solution, iterations=solution.iterations + fitted.solution.iterations), program)
-    return Growth(fitted, is_sound(model, fitted) and _joined_at_no_cost(before, fitted))
+    return Growth(fitted, is_sound(model, fitted) and joined_at_no_cost(before, fitted))
 
 
 def _better_start(model: Model, program: Program, point: Point) -> Point:
@@ -116,7 +116,7 @@ def _better_start(model: Model, program: Program, point: Point) -> Point:
     return min(point, guess, key=program.objective)
 
 
-def _joined_at_no_cost(before: Fitted, after: Fitted) -> bool:
+def joined_at_no_cost(before: Fitted, after: Fitted) -> bool:
     """Likelihood ratio test of longer windows against the shorter ones, whose start states are free, at JOINING."""
     freed = sum(cut.count for cut in before.program.segments) - sum(cut.count for cut in after.program.segments)
     if freed <= 0:
