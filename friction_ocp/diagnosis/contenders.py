@@ -34,17 +34,28 @@ def to_refit(
 ) -> tuple[list[Screened], list[Screened]]:
     """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
 
+    What may be large and yet promises nothing is tried wherever a model has gone astray.
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
     joined segments do, where both are judged by squares.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
-    if chosen and current.lost:
+    if not chosen or not current.astray:
+        return with_resembling(chosen, found), []
+    outright = [item for item in found if item.augmentation.outright is not None]
+    if current.lost:
         first = [item for item in chosen if item.starts][:BEGUN]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
+        tried = _and(tried, outright)
         return _leading(tried, crew.fitted_loosely(tried)) if current.leads_loosely else tried, []
-    unfitted = _promising(crew.screened_unfitted(keys)) if chosen and current.astray else []
-    return with_resembling(chosen, found, current.astray), unfitted
+    unfitted = _promising(crew.screened_unfitted(keys))
+    return _and(with_resembling(chosen, found, astray=True), outright), _and(unfitted, outright)
+
+
+def _and(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
+    """Return chosen candidates with those of others that are not among them."""
+    keys = {item.key for item in chosen}
+    return [*chosen, *(item for item in others if item.key not in keys)]
 
 
 def _leading(tried: Sequence[Screened], gains: Sequence[float]) -> list[Screened]:

@@ -31,21 +31,22 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
     where most of that stays, steps begin at a large effect, too. Of free runs that miss much steps begin where loosely
-    joined segments lead, too.
+    joined segments lead, too, and so they do at a large effect that no prediction shows.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
     program = base.footing.training(model)
     points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
     ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
-    best = min(end.objective for end in ends)
+    best = min([end.objective for end in ends], default=np.inf)
     if base.astray and base.footing.segment_s is not None and base.objective - best < item.gain:
         away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
         far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]
-    if base.lost:
-        values = item.starts[0].values(item.augmentation.off, base.values, 1.0)
-        ends.append(timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK))
+    loose = [start.values(item.augmentation.off, base.values, 1.0) for start in item.starts[:1]] if base.lost else []
+    if item.augmentation.outright is not None and base.astray:
+        loose.append({**base.values, **item.augmentation.outright})
+    ends += [timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK) for values in loose]
     large, best = item.augmentation.large, min(end.objective for end in ends)
     if base.astray and large is not None and base.objective - best < MOST_OF * base.objective:
         tried = [large(start.added(item.augmentation.off)) for start in item.starts]
@@ -56,10 +57,16 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
 
 
 def fitted_loosely(loose: FittedModel, item: Screened) -> float:
-    """Return the objective of a candidate on loosely joined segments, fitted from where its first start is."""
+    """Return the objective of a candidate on loosely joined segments, fitted from where its first start is.
+
+    Or from a large effect, where no start shows that.
+    """
     model = with_drive(loose.model, item.augmentation.drive)
-    values = {**loose.values, **item.starts[0].added(item.augmentation.off)}
-    program, point = loosely_joined(model, [model.space.clip(model.space.with_known(values))])
+    added = [start.added(item.augmentation.off) for start in item.starts[:1]]
+    if item.augmentation.outright is not None:
+        added.append(dict(item.augmentation.outright))
+    starts = [model.space.clip(model.space.with_known({**loose.values, **values})) for values in added]
+    program, point = loosely_joined(model, starts)
     return program.objective(point)
 
 

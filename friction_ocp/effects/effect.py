@@ -207,6 +207,9 @@ class Augmentation:
     trials: tuple[Trial, ...]
     large: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Gives values at which a large effect may begin, from those of a small one; None where size is all that grows."""
+    outright: Mapping[str, float] | None = None
+    """Values at which a large effect may begin of which small ones tell nothing: no derivative shows a flank out of
+    reach. None where they do."""
 
 
 @dataclass(frozen=True)

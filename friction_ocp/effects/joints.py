@@ -27,6 +27,10 @@ HARD = 0.1
 RUNG, LARGEST_PLAY = 5.0, 0.03
 """How far apart the plays are at which backlash is tried beyond the twist of the spring, and the largest one over the
 travel: flanks that are hard twist much less than they are apart."""
+OF_TWIST = 2.0 / 3.0
+"""Large play over the range of the twist: what is left of it twists the flanks."""
+RARE = 0.01
+"""Share of the samples at either end that does not count for a range."""
 
 
 class BacklashEffect(AbstractEffect):
@@ -49,7 +53,16 @@ class BacklashEffect(AbstractEffect):
         while plays[-1] * RUNG <= LARGEST_PLAY * _travel(item, clues):
             plays.append(plays[-1] * RUNG)
         added = change_transmission(drive, place, backlash=upwards(twist))
-        return Augmentation(added, {path: 0.0}, tuple(Trial(({path: play},)) for play in plays))
+        large = {path: OF_TWIST * _range_of_twist(item, clues)}
+        trials = tuple(Trial(({path: play},)) for play in plays)
+        return Augmentation(added, {path: 0.0}, trials, outright=large)
+
+
+def _range_of_twist(item: Transmission, clues: Clues) -> float:
+    """Return the range over which a joint twists along a recording, rad on its output side."""
+    ratio = clues.numbers.get(f"{item.name}.ratio", 1.0)
+    twists = [track.theta[item.from_shaft] / ratio - track.theta[item.to_shaft] for track in clues.tracks]
+    return max(float(np.ptp(np.quantile(twist, [RARE, 1.0 - RARE]))) for twist in twists)
 
 
 def _travel(item: Transmission, clues: Clues) -> float:
