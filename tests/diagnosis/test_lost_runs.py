@@ -145,6 +145,23 @@ def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with
     assert unfitted == []
 
 
+def test_what_promises_nothing_while_small_is_tried_where_a_model_has_gone_astray() -> None:
+    """From where the parameters are and from the guesses; not where the model is near the recordings."""
+    stiffening, play = candidate("stiffening", 1.0, gain=9.0), candidate("backlash", gain=0.0)
+    play = replace(play, augmentation=replace(play.augmentation, outright={"size": 1.0}))
+    guessed = candidate("asymmetry", 1.0)
+
+    def screened_unfitted(keys: list[Key]) -> list[Screened]:
+        return [guessed]
+
+    for astray, also in ((True, [play]), (False, [])):
+        current = SimpleNamespace(lost=False, leads_loosely=False, astray=astray)
+        crew = SimpleNamespace(bench=SimpleNamespace(current=current), screened_unfitted=screened_unfitted)
+        chosen, unfitted = to_refit(cast(Any, crew), [stiffening], [stiffening, play])
+        assert chosen == [stiffening, *also]
+        assert unfitted == ([guessed, play] if astray else [])
+
+
 def test_a_fit_of_loosely_joined_segments_tells_what_is_missing(bench: Bench) -> None:
     """Predictions are straight lines; fits gain most with what is missing, more than twice what others do."""
     crew = crew_of(bench)
