@@ -48,6 +48,7 @@ def _transmission(item: Transmission) -> Transmission:
         item,
         backlash=_on(item.backlash),
         stiffening=_on(item.stiffening),
+        second_stage=_live(item.second_stage),
         hysteresis=_live(item.hysteresis),
         kinematic_error=_live(item.kinematic_error),
     )

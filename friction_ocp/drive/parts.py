@@ -7,6 +7,7 @@ backlash of a transmission are on its output side; ratio = speed_in / speed_out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import sqrt
 from typing import Any, Literal
 
 from friction_ocp.friction.element import FrictionElement
@@ -119,6 +120,30 @@ class Hysteresis:
         return is_off(self.torque)
 
 
+ROUNDING = sqrt(0.5)
+"""Of a second stage, over its twist: between a kink and the cubic law."""
+
+
+@dataclass(frozen=True)
+class SecondStage:
+    r"""A spring that takes part from about a twist on, as the data sheets of strain wave gears have it.
+
+    .. math:: \tau = k \left(w + \frac{\sqrt{(w - s)^2 + r^2} - \sqrt{(w + s)^2 + r^2}}{2 c}\right),
+        \quad c = \sqrt{1 - \text{rounding}^2}, \; s = c \cdot \text{twist}, \; r = \text{rounding} \cdot \text{twist}
+
+    Nothing at w = 0 and k (w - twist) far beyond; up to the twist it grows with w^3.
+    """
+
+    stiffness: Value = quantity("stiffness", "stiffness of the second stage")
+    twist: Value = quantity("angle", "twist from which the second stage takes part", nested="guess")
+    rounding: Value = quantity("dimensionless", "rounding of the second stage's beginning over its twist", ROUNDING)
+
+    @property
+    def idle(self) -> bool:
+        """Whether its stiffness is plainly zero."""
+        return is_off(self.stiffness)
+
+
 @dataclass(frozen=True)
 class KinematicError(
     Wave, kind="angle", of="the kinematic error", over="input_angle", period="the kinematic error over the input angle"
@@ -130,7 +155,7 @@ class KinematicError(
 class Transmission:
     """A reducer, coupling or screw between two shafts; `stiffness` None joins them rigidly.
 
-    Twisted by w beyond its play it carries stiffness w + stiffening w^3.
+    Twisted by w beyond its play it carries stiffness w + stiffening w^3, and what its second stage does.
     """
 
     from_shaft: str
@@ -140,6 +165,7 @@ class Transmission:
     damping: Value = quantity("viscous", "damping", 0.0)
     backlash: Value = quantity("angle", "free play", 0.0)
     stiffening: Value = quantity("cubic_stiffness", "cubic stiffness", 0.0)
+    second_stage: SecondStage | None = None
     hysteresis: Hysteresis | None = None
     kinematic_error: KinematicError | None = None
 

@@ -66,7 +66,7 @@ def _averaged(drive: Drive, placed: bool) -> Drive:
         shafts=tuple(replace(item, disturbance=None, friction=replace(item.friction, **kept)) for item in drive.shafts),
         transmissions=tuple(
             replace(
-                item, stiffness=None, damping=0.0, backlash=0.0, stiffening=0.0, hysteresis=None, kinematic_error=None
+                item, stiffness=None, damping=0.0, backlash=0.0, stiffening=0.0, second_stage=None, hysteresis=None, kinematic_error=None
             )
             for item in drive.transmissions
         ),

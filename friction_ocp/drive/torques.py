@@ -9,8 +9,8 @@ import casadi as ca
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
 from friction_ocp.drive.motors import cogging_torque, motor_torque
-from friction_ocp.drive.parts import Shaft, Transmission
-from friction_ocp.friction.smoothing import decay_means, smooth_abs, soft_threshold, where
+from friction_ocp.drive.parts import SecondStage, Shaft, Transmission
+from friction_ocp.friction.smoothing import decay_means, smooth_abs, soft_threshold, sqrt, where
 
 
 def applied_torques(mech: Mechanism, motion: Motion, corner: Any) -> dict[str, Any]:
@@ -78,7 +78,15 @@ def _spring_torque(item: Transmission, twist: Any, rate: Any, corner: Any) -> An
 
 def _wound_torque(item: Transmission, wound: Any) -> Any:
     torque = item.stiffness * wound
-    return torque if item.stiffening is None else torque + item.stiffening * wound**3
+    if item.stiffening is not None:
+        torque = torque + item.stiffening * wound**3
+    return torque if item.second_stage is None else torque + _staged_torque(item.second_stage, wound)
+
+
+def _staged_torque(stage: SecondStage, wound: Any) -> Any:
+    share = sqrt(1.0 - stage.rounding * stage.rounding)
+    begin, width = share * stage.twist, stage.rounding * stage.twist
+    return stage.stiffness * (wound + 0.5 * (smooth_abs(wound - begin, width) - smooth_abs(wound + begin, width)) / share)
 
 
 def _loop_torque(mech: Mechanism, item: Transmission, motion: Motion, rate: Any) -> Any:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from friction_ocp.drive.parts import Drive, Hysteresis, KinematicError, Transmission
+from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, SecondStage, Transmission
 from friction_ocp.effects.effect import (
     SHARP,
     AbstractEffect,
@@ -29,6 +30,8 @@ RUNG, LARGEST_PLAY = 5.0, 0.03
 travel: flanks that are hard twist much less than they are apart."""
 OF_TWIST = 2.0 / 3.0
 """Large play over the range of the twist: what is left of it twists the flanks."""
+STAGES = (0.1, 0.3, 0.8, 2.0)
+"""Twists from which a second stage is tried, over the largest one."""
 RARE = 0.01
 """Share of the samples at either end that does not count for a range."""
 
@@ -138,13 +141,25 @@ class StiffeningEffect(AbstractEffect):
     sentence: ClassVar[str] = "stiffness grows with the twist"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.transmissions if not item.rigid and is_off(item.stiffening)]
+        elastic = [item for item in drive.transmissions if not item.rigid and is_off(item.stiffening)]
+        return [item.name for item in elastic if item.second_stage is None]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        torque, twist = _twist(transmission(drive, place), clues)
-        size, path = 0.1 * torque / twist**3, f"{place}.stiffening"
-        added = change_transmission(drive, place, stiffening=Free(size, 0.0, 1e4 * size))
-        return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
+        item, path = transmission(drive, place), f"{place}.second_stage"
+        size, largest = 0.3 * clues.numbers[f"{place}.stiffness"], 0.5 * _range_of_twist(item, clues)
+        twists = [max(share * largest, 1e-300) for share in STAGES]
+        stage = SecondStage(upwards(size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
+        added = change_transmission(drive, place, second_stage=stage)
+        trials = tuple(Trial(({f"{path}.stiffness": size},), {f"{path}.twist": one}) for one in twists)
+        return Augmentation(added, {f"{path}.stiffness": 0.0}, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive whose second stage begins more suddenly, or less."""
+        stage, path = transmission(drive, place).second_stage, f"{place}.second_stage.rounding"
+        if stage is None or stage.rounding != ROUNDING:
+            return None
+        added = change_transmission(drive, place, second_stage=replace(stage, rounding=Free(ROUNDING, 0.02, 0.98)))
+        return Augmentation(added, {path: ROUNDING}, (Trial(({path: 0.9 * ROUNDING},)),))
 
 
 class TransmissionHysteresisEffect(AbstractEffect):

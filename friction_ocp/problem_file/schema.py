@@ -55,6 +55,7 @@ from friction_ocp.problem_file.term_sections import (
     GravityTerm,
     HysteresisTerm,
     KinematicErrorTerm,
+    SecondStageTerm,
     TorqueRippleTerm,
 )
 
@@ -93,6 +94,7 @@ class TransmissionSection(Section):
     damping: Number = 0.0
     backlash: Number = 0.0
     stiffening: Number = 0.0
+    second_stage: SecondStageTerm = None
     hysteresis: HysteresisTerm = None
     kinematic_error: KinematicErrorTerm = None
 

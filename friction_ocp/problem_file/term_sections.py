@@ -17,6 +17,7 @@ from friction_ocp.drive.parts import (
     Gravity,
     Hysteresis,
     KinematicError,
+    SecondStage,
     TorqueRipple,
 )
 from friction_ocp.friction.modifiers import Ripple, WarmUp
@@ -51,6 +52,7 @@ EccentricityTerm = Annotated[Any, PlainValidator(_reader(Eccentricity))]
 RippleTerm = Annotated[Any, PlainValidator(_reader(Ripple))]
 TorqueRippleTerm = Annotated[Any, PlainValidator(_reader(TorqueRipple))]
 WarmUpTerm = Annotated[Any, PlainValidator(_reader(WarmUp))]
+SecondStageTerm = Annotated[Any, PlainValidator(_reader(SecondStage))]
 HysteresisTerm = Annotated[Any, PlainValidator(_reader(Hysteresis))]
 KinematicErrorTerm = Annotated[Any, PlainValidator(_reader(KinematicError))]
 ExternalTorqueTerm = Annotated[Any, PlainValidator(_reader(ExternalTorque))]

@@ -128,7 +128,9 @@ def _rigid(drive: Drive) -> tuple[Drive, list[Loss]]:
         if not item.rigid
     ]
     stiff = tuple(
-        replace(item, stiffness=None, damping=0.0, backlash=None, stiffening=None, hysteresis=None)
+        replace(
+            item, stiffness=None, damping=0.0, backlash=None, stiffening=None, second_stage=None, hysteresis=None
+        )
         for item in drive.transmissions
     )
     return replace(drive, transmissions=stiff), losses
@@ -214,7 +216,7 @@ def _shown(value: object) -> str:
 
 
 def _transmission_losses(item: Transmission) -> Iterator[Loss]:
-    for key in ("stiffening", "hysteresis", "kinematic_error"):
+    for key in ("stiffening", "second_stage", "hysteresis", "kinematic_error"):
         if getattr(item, key) is not None:
             yield Loss(f"{item.name}.{key}", "left out")
     if item.backlash is not None and float(item.damping or 0.0) > 0.0:

@@ -24,6 +24,7 @@ from friction_ocp.drive.parts import (
     Hysteresis,
     KinematicError,
     Motor,
+    SecondStage,
     Shaft,
     TorqueRipple,
     Transmission,
@@ -131,8 +132,19 @@ SPRING = Transmission("axis", "load", RATIO, STIFFNESS, DAMPING)
 PAIR_MOVING = {"axis.theta": 0.2, "load.theta": 0.01, "axis.omega": 15.0, "load.omega": 2.0}
 
 
+STAGE, ROUND = (900.0, 0.02), 0.4
+
+
+def staged(twist: float) -> float:
+    """Return the torque of a second stage: a spring between twist and k (twist - 0.02), rounded over 0.4 of that."""
+    stiffness, begin = STAGE
+    sharp = begin * np.sqrt(1 - ROUND**2)
+    soft = np.hypot(twist - sharp, ROUND * begin) - np.hypot(twist + sharp, ROUND * begin)
+    return stiffness * (twist + soft / (2 * np.sqrt(1 - ROUND**2)))
+
+
 def two_masses(
-    cubic: float = 0.0, error: Sequence[float] = (0.0, 0.0), loop: float = 0.0
+    cubic: float = 0.0, error: Sequence[float] = (0.0, 0.0), loop: float = 0.0, stage: float = 0.0
 ) -> Callable[[float, Sequence[float]], list[float]]:
     """Return the equations of the pair with a cubic spring, a kinematic error over the motor angle, and a loop."""
 
@@ -141,7 +153,7 @@ def two_masses(
         z = x[4] if len(x) > 4 else 0.0
         transfer = 1 / RATIO + wave(error, ERROR_PERIOD, q, 1)
         twist, rate = q / RATIO + wave(error, ERROR_PERIOD, q) - p, transfer * v - w
-        torque = STIFFNESS * twist + cubic * twist**3 + DAMPING * rate + loop * z / LOOP_TWIST
+        torque = STIFFNESS * twist + cubic * twist**3 + DAMPING * rate + loop * z / LOOP_TWIST + stage * staged(twist)
         motor = (command(t) - 0.1 - 0.02 * v - transfer * torque) / J
         slip = [rate - abs(rate) * z / LOOP_TWIST] if len(x) > 4 else []
         return [v, w, motor, (torque - 0.1 * w) / 0.5, *slip]
@@ -205,6 +217,9 @@ CASES: dict[str, Case] = {
     "loaded rigid kinematic error": Case(geared(LOADED_ERROR, RIGID_SHARE), MOVING, rigid(LOADED_ERROR, RIGID_SHARE)),
     "rigid kinematic error with overtones": Case(geared(OVERTONES), MOVING, rigid(OVERTONES)),
     "stiffening": Case(pair(replace(SPRING, stiffening=2e5)), PAIR_MOVING, two_masses(2e5)),
+    "second stage": Case(
+        pair(replace(SPRING, second_stage=SecondStage(*STAGE, ROUND))), PAIR_MOVING, two_masses(stage=1.0)
+    ),
     "kinematic error": Case(
         pair(replace(SPRING, kinematic_error=KinematicError(*ERROR, ERROR_PERIOD))),
         PAIR_MOVING,
@@ -324,11 +339,12 @@ ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "servo.lag": lambda off: axis(PLAIN, Motor("servo", "axis", lag=off)),
     "servo.saturation": lambda off: axis(PLAIN, Motor("servo", "axis", saturation=off)),
     "axis-load.stiffening": lambda off: pair(replace(SPRING, stiffening=off)),
+    "axis-load.second_stage": lambda off: pair(replace(SPRING, second_stage=SecondStage(off, 0.02))),
     "axis-load.hysteresis": lambda off: pair(replace(SPRING, hysteresis=Hysteresis(off, LOOP_TWIST))),
     "axis-load.kinematic_error": lambda off: pair(replace(SPRING, kinematic_error=KinematicError(off, off, 0.9))),
     "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
 }
-AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation", "stiffening", "hysteresis.torque")
+AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation", "stiffening", "hysteresis.torque", "second_stage.stiffness")
 
 
 def sensed(eccentricity: Eccentricity | None) -> Drive:

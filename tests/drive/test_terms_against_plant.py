@@ -53,6 +53,7 @@ PLANTS: dict[str, Plant] = {
     "saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 2.0))),
     "sharp saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 4.0))),
     "stiffening": pair(joint=replace(JOINT, cubic=3e5)),
+    "second stage": pair(joint=replace(JOINT, second_stage=(900.0, 0.003))),
     "hysteresis": pair(joint=replace(JOINT, loop=PlantLoop(((1.0, 0.003),), smooth=True))),
     "kinematic error": pair(joint=replace(JOINT, kinematic_error=PlantRipple(0.7, 0.003, 0.004))),
     "backlash and all of these": pair(

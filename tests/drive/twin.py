@@ -34,6 +34,7 @@ from friction_ocp.drive.parts import (
     Hysteresis,
     KinematicError,
     Motor,
+    SecondStage,
     Shaft,
     TorqueRipple,
     Transmission,
@@ -124,7 +125,7 @@ def _shaft(shaft: PlantShaft) -> Shaft:
 
 def _transmission(item: PlantTransmission) -> Transmission:
     loop, stiffness = item.loop, item.stiffness if np.isfinite(item.stiffness) else None
-    assert item.second_stage == (0.0, 0.0) and (loop is None or (loop.smooth and len(loop.elements) == 1))
+    assert loop is None or (loop.smooth and len(loop.elements) == 1)
     return Transmission(
         item.from_shaft,
         item.to_shaft,
@@ -133,6 +134,7 @@ def _transmission(item: PlantTransmission) -> Transmission:
         item.damping,
         item.backlash,
         item.cubic,
+        SecondStage(*item.second_stage, 0.0) if any(item.second_stage) else None,
         None if loop is None else Hysteresis(*loop.elements[0]),
         _wave(KinematicError, item.kinematic_error),
     )

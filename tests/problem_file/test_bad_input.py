@@ -179,6 +179,20 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         ),
         "drive.transmissions[0].hysteresis: hysteresis of a rigid transmission has no effect; state a stiffness",
     ),
+    "second stage that softens": (
+        several(
+            put("drive/shafts", TWO_SHAFTS),
+            put("drive/transmissions", [{"stiffness": 10, "second_stage": {"stiffness": -1, "twist": 0.1}}]),
+        ),
+        "drive.transmissions[0].second_stage.stiffness: second_stage.stiffness = -1 N m/rad; must not be negative",
+    ),
+    "second stage that is rounded away": (
+        several(
+            put("drive/shafts", TWO_SHAFTS),
+            put("drive/transmissions", [{"stiffness": 10, "second_stage": {"stiffness": 1, "twist": 1, "rounding": 1}}]),
+        ),
+        "drive.transmissions[0].second_stage.rounding: second_stage.rounding = 1; must be at least 0 and below 1",
+    ),
     "error of a rigid joint backwards": (
         several(
             put("drive/shafts", TWO_SHAFTS),

@@ -262,6 +262,7 @@ def test_terms_of_a_gear_are_read_under_their_paths(workshop: Workshop) -> None:
         drive = content["drive"]
         drive["shafts"].append({"name": "arm", "inertia": 0.1})
         joint = {"stiffness": 100, "stiffening": {"guess": 0}, "hysteresis": {"torque": {"guess": 0}, "twist": 0.01}}
+        joint["second_stage"] = {"stiffness": {"guess": 0}, "twist": 0.02, "rounding": 0.5}
         joint["kinematic_error"] = {"cosine": 0.001, "sine": 0, "period": 0.5}
         drive["transmissions"] = [joint]
         drive["motor"] |= {"lag": {"guess": 0, "min": 0, "max": 0.1}, "saturation": 0.01}
@@ -269,6 +270,7 @@ def test_terms_of_a_gear_are_read_under_their_paths(workshop: Workshop) -> None:
     problem = load_problem(workshop.problem(spoil))
     values = {leaf.path: leaf.value for leaf in drive_leaves(problem.drive)}
     assert values["load-arm.stiffening"] == values["load-arm.hysteresis.torque"] == Free(0.0)
+    assert (values["load-arm.second_stage.stiffness"], values["load-arm.second_stage.rounding"]) == (Free(0.0), 0.5)
     assert (values["load-arm.hysteresis.twist"], values["load-arm.kinematic_error.cosine"]) == (0.01, 0.001)
     assert (values["motor.lag"], values["motor.saturation"]) == (Free(0.0, 0.0, 0.1), 0.01)
     assert [str(item) for item in check(problem) if item.severity == "error"] == []

@@ -79,7 +79,7 @@ def rigid_joints_have_no_play(case: Case) -> Iterator[Finding]:
 
 def _idle_numbers(item: Transmission) -> list[str]:
     numbers = [key for key in ("damping", "backlash", "stiffening") if not is_off(getattr(item, key))]
-    return numbers if item.hysteresis is None else [*numbers, "hysteresis"]
+    return [*numbers, *(key for key in ("second_stage", "hysteresis") if getattr(item, key) is not None)]
 
 
 def _unknown_shaft(where: str, name: str, names: list[str]) -> Finding:

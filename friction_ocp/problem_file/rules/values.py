@@ -18,7 +18,10 @@ _POSITIVE = {
     *("width", "period", "other_period", "time_constant", "twist", "saturation_sharpness"),
 }
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
+_MAY_BE_ZERO = ".second_stage.stiffness"
+"""A stiffness that adds to another."""
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
+_BELOW_ONE = {"rounding"}
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
 _DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
@@ -49,10 +52,12 @@ def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
     """Stiffness is positive, damping not negative, a ratio not zero."""
     for path, number in case.numbers.items():
         key = next(part for part in reversed(path.split(".")) if part not in _DIRECTIONS and not part.isdigit())
+        adds = path.endswith(_MAY_BE_ZERO) or case.leaves[path].kind == "saturation"
         impossible = [
-            (key in _POSITIVE and number <= 0, "must be positive"),
-            ((key in _NOT_NEGATIVE or case.leaves[path].kind == "saturation") and number < 0, "must not be negative"),
+            (key in _POSITIVE and not adds and number <= 0, "must be positive"),
+            ((key in _NOT_NEGATIVE or adds) and number < 0, "must not be negative"),
             (key in _NOT_ZERO and number == 0, "must not be zero"),
+            (key in _BELOW_ONE and not 0 <= number < 1, "must be at least 0 and below 1"),
         ]
         for _, allowed in (item for item in impossible if item[0]):
             yield Finding(case.at(case.place(path)), case.written(path), allowed)
