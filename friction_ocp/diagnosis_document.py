@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
+from friction_ocp.diagnosis.loop import opened
 from friction_ocp.diagnosis.options import AT, considered
 from friction_ocp.diagnosis.reading import corrections, with_additions
 from friction_ocp.diagnosis.rival import Rival
@@ -291,7 +292,8 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
         unit = si_unit("torque", diagnosis.problem.drive.shaft(shaft).motion)
         noise = f"torque noise {density:.3g} {unit}/sqrt(Hz)"
         lines.append(f"{shaft}: {noise}, from the measured inputs and what the file states")
-    lines += [] if diagnosis.stated is None else corrections(diagnosis.stated, diagnosis.problem)
+    if diagnosis.stated is not None:
+        lines += corrections(diagnosis.stated, diagnosis.problem) + opened(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
     meant = considered(diagnosis.problem)
     left_out = [name for name in effects() if name not in meant.names]

@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
+from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
 from friction_ocp.diagnosis.reading import explains_more
 from friction_ocp.diagnosis.search import Search
@@ -56,7 +57,7 @@ class Diagnosis:
     cut_short: bool = False
     """Whether the search ended there, with things left to try."""
     stated: Problem | None = None
-    """The problem as it was given, where its inputs are not read as it states."""
+    """The problem as it was given, where its inputs are not read as it states or its loop is opened."""
 
     @property
     def gap(self) -> bool:
@@ -137,8 +138,15 @@ def diagnose(
     """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive.
 
     Where the inputs, read the other way between their samples, leave nothing with fewer additions, or where something
-    was left, that is how they are read.
+    was left, that is how they are read. What a controller makes of noise is read from its recorded command.
     """
+    driven = driven_as_recorded(problem)
+    found = _as_read(problem if driven is None else driven, tell, execution)
+    return found if driven is None else replace(found, stated=problem)
+
+
+def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
+    """Find what a model lacks, its inputs read as the problem says or the other way."""
     readings = OtherReadings(problem)
     stated = _diagnosed(problem, tell, execution, readings)
     if not stated.gap:

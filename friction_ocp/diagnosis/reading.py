@@ -44,12 +44,12 @@ def _turned(channel: Channel) -> Channel:
 
 def corrections(stated: Problem, read: Problem) -> list[str]:
     """Return a sentence for every input that is not read as stated."""
-    before = {item.name: item.hold for item in stated.drive.channels}
+    before = {item.name: item.hold for item in stated.drive.inputs}
     words = {"zero": "is held between its samples", "linear": "runs in lines from sample to sample"}
     return [
         f"{item.name}: {words[item.hold]}: with `hold: {before[item.name]}` the recordings would need a delay"
         for item in read.drive.channels
-        if item.hold != before[item.name]
+        if item.hold != before.get(item.name, item.hold)
     ]
 
 

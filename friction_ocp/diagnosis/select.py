@@ -82,7 +82,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
     parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), and its distance from
     stated values what their priors say; rivals that leave the same residuals share what they have. Of an effect and one
-    that has all of it and more, the plain one comes first as long as it is not excluded.
+    that has all of it and more, the plain one comes first as long as it is not excluded, or where what the other has
+    more came out as nothing.
     """
     if not rivals:
         return NOTHING
@@ -105,8 +106,15 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
         aliases=tuple(aliases),
         same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
     )
-    special = next((rival for rival in aliases[1:] if ordered[0].screened.holds(rival.screened)), None)
+    others = [rival for rival in ordered[1:] if ordered[0].screened.holds(rival.screened)]
+    special = next((rival for rival in others if rival in aliases or _adds_nothing(ordered[0], rival)), None)
     return found if special is None else with_first(found, special)
+
+
+def _adds_nothing(whole: Rival, part: Rival) -> bool:
+    """Whether what a rival has beside another one came out as nothing."""
+    off, values = whole.screened.augmentation.off, whole.standing.values
+    return all(values[name] == off[name] for name in off.keys() - part.screened.augmentation.off.keys())
 
 
 def with_refused(choice: Choice, refused: tuple[Rival, ...]) -> Choice:

@@ -66,6 +66,15 @@ def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
     assert shown((disc, here)) == (disc, here)
 
 
+@pytest.mark.parametrize(("play", "first"), [(0.0, "compliance"), (1e-4, "backlash")])
+def test_what_comes_out_as_nothing_is_no_effect(play: float, first: str) -> None:
+    """Flanks of a joint without play between them are a spring, however much better the fit of the flanks ended."""
+    spring = rival("compliance", "gear", {"gear.stiffness": np.inf}, gain=5.0)
+    flanks = rival("backlash", "gear", {"gear.stiffness": np.inf, "gear.backlash": 0.0}, gain=6.0)
+    flanks = replace(flanks, standing=replace(flanks.standing, values={"gear.stiffness": 9.0, "gear.backlash": play}))
+    assert chosen(spring, flanks).rivals[0].key[0] == first
+
+
 def test_the_same_effect_elsewhere_stands_back_behind_a_rival() -> None:
     """Where a rival differs, naming one effect at two components that are the same would make three of two answers."""
     arm, motor = rival("constant_torque", "arm", {"a": 0.0}), rival("constant_torque", "motor", {"b": 0.0})
