@@ -13,7 +13,7 @@ import casadi as ca
 
 from friction_ocp.drive.kick import Unknown, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism
-from friction_ocp.drive.parts import Drive, Motor
+from friction_ocp.drive.parts import Drive, Motor, Transmission
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.torques import applied_torques
 
@@ -64,12 +64,7 @@ def _averaged(drive: Drive, placed: bool) -> Drive:
     return replace(
         drive,
         shafts=tuple(replace(item, disturbance=None, friction=replace(item.friction, **kept)) for item in drive.shafts),
-        transmissions=tuple(
-            replace(
-                item, stiffness=None, damping=0.0, backlash=0.0, stiffening=0.0, second_stage=None, hysteresis=None, kinematic_error=None
-            )
-            for item in drive.transmissions
-        ),
+        transmissions=tuple(Transmission(item.from_shaft, item.to_shaft, item.ratio) for item in drive.transmissions),
         motors=tuple(replace(item, cogging=None, torque_ripple=None) for item in drive.motors),
         controller=None,
         channels=(),

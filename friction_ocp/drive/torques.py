@@ -86,7 +86,8 @@ def _wound_torque(item: Transmission, wound: Any) -> Any:
 def _staged_torque(stage: SecondStage, wound: Any) -> Any:
     share = sqrt(1.0 - stage.rounding * stage.rounding)
     begin, width = share * stage.twist, stage.rounding * stage.twist
-    return stage.stiffness * (wound + 0.5 * (smooth_abs(wound - begin, width) - smooth_abs(wound + begin, width)) / share)
+    soft = smooth_abs(wound - begin, width) - smooth_abs(wound + begin, width)
+    return stage.stiffness * (wound + 0.5 * soft / share)
 
 
 def _loop_torque(mech: Mechanism, item: Transmission, motion: Motion, rate: Any) -> Any:

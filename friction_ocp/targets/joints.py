@@ -128,9 +128,7 @@ def _rigid(drive: Drive) -> tuple[Drive, list[Loss]]:
         if not item.rigid
     ]
     stiff = tuple(
-        replace(
-            item, stiffness=None, damping=0.0, backlash=None, stiffening=None, second_stage=None, hysteresis=None
-        )
+        replace(item, stiffness=None, damping=0.0, backlash=None, stiffening=None, second_stage=None, hysteresis=None)
         for item in drive.transmissions
     )
     return replace(drive, transmissions=stiff), losses

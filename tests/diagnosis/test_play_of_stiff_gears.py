@@ -58,7 +58,8 @@ def record(name: str, seed: int) -> Recording:
     wanted = np.asarray(wanted) * rng.uniform(0.8, 1.2) * RATIO
     run = telescope().simulate(SECONDS, {"reference.theta": Trajectory(time, wanted, "zero")}, rng)
     clocks = {"current": "driver"}
-    return Recording(name, {key: Channel(key, *run.channels[key], UNITS[key], clocks.get(key, "time")) for key in UNITS})
+    found = {key: Channel(key, *run.channels[key], UNITS[key], clocks.get(key, "time")) for key in UNITS}
+    return Recording(name, found)
 
 
 def document() -> dict[str, object]:

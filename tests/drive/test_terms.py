@@ -344,7 +344,10 @@ ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "axis-load.kinematic_error": lambda off: pair(replace(SPRING, kinematic_error=KinematicError(off, off, 0.9))),
     "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
 }
-AMPLITUDE = ("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation", "stiffening", "hysteresis.torque", "second_stage.stiffness")
+AMPLITUDE = (
+    *("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation"),
+    *("stiffening", "hysteresis.torque", "second_stage.stiffness"),
+)
 
 
 def sensed(eccentricity: Eccentricity | None) -> Drive:

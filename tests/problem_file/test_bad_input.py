@@ -57,6 +57,7 @@ FRICTION = f"{SHAFT}/friction"
 DUTY = {"type": "duty", "feedback": "position", "kp": 1.0}
 SECOND_SHAFT = {"name": "arm", "inertia": 0.1}
 TWO_SHAFTS = [{"name": "load", "inertia": 0.1}, SECOND_SHAFT]
+STAGE = {"stiffness": 1, "twist": 0.1}
 RIPPLING = {"cosine": {"guess": 0}, "sine": 0.01, "period": 1}
 LUGRE = {"law": "lugre", "tau_c": 1, "tau_s": 1.5, "omega_s": 0.1, "sigma0": 100}
 
@@ -182,14 +183,14 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "second stage that softens": (
         several(
             put("drive/shafts", TWO_SHAFTS),
-            put("drive/transmissions", [{"stiffness": 10, "second_stage": {"stiffness": -1, "twist": 0.1}}]),
+            put("drive/transmissions", [{"stiffness": 10, "second_stage": {**STAGE, "stiffness": -1}}]),
         ),
         "drive.transmissions[0].second_stage.stiffness: second_stage.stiffness = -1 N m/rad; must not be negative",
     ),
     "second stage that is rounded away": (
         several(
             put("drive/shafts", TWO_SHAFTS),
-            put("drive/transmissions", [{"stiffness": 10, "second_stage": {"stiffness": 1, "twist": 1, "rounding": 1}}]),
+            put("drive/transmissions", [{"stiffness": 10, "second_stage": {**STAGE, "rounding": 1}}]),
         ),
         "drive.transmissions[0].second_stage.rounding: second_stage.rounding = 1; must be at least 0 and below 1",
     ),
