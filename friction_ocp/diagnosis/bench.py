@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
-from friction_ocp.diagnosis.refit import NUDGES, nudged
+from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard, innovations
 from friction_ocp.drive.parts import Drive
@@ -100,11 +100,9 @@ class Bench:
 
         None where that cannot be simulated.
         """
-        current, stated = self.current, self.base.model.space
+        current = self.current
         model, program = current.model, current.linear.program
-        guesses = dict(zip(stated.names, map(float, stated.guess), strict=True))
-        theta = model.space.clip(model.space.with_known(current.values | guesses))
-        point = begun(program, theta)
+        point = begun(program, guessed(current, self.base.model.space))
         if not np.isfinite(program.objective(point)):
             return None
         return FittedModel(model, current.footing, linear_program(program, point))
@@ -216,7 +214,8 @@ def opened_better(bench: Bench, execution: Execution) -> Bench:
 
 
 def bettered(bench: Bench, execution: Execution) -> Bench:
-    """Return the bench of the current model where it fits better, found from parameters that chance has changed.
+    """Return the bench of the current model where it fits better, found from the guesses or from parameters that chance
+    has changed.
 
     Tries go on from the best one as long as they better it. There are none where much is missed: where a model that
     lacks something large ends says little.
@@ -226,6 +225,7 @@ def bettered(bench: Bench, execution: Execution) -> Bench:
         return bench
     for turn in range(MOST_TURNS):
         tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]
+        tasks += [Task("nudge-guesses", begin_again)] if turn == 0 else []
         shared = bench.fingerprint
         outcomes = run_tasks("looking for a better fit", tasks, bench, shared, execution.executor, execution.ledger)
         ends = [value for value in map(value_of, outcomes.values()) if value is not None]
@@ -240,7 +240,15 @@ def nudge(bench: Bench, point: Json, seed: int) -> Json:
     """Fit the current model again from beside a point, its own if that is null; null where that breaks down."""
     current = bench.current
     start = current if point is None else seated(current.model, current.footing, point)
-    fitted = nudged(start, bench.problem.estimation.seed + seed)
+    return _better_point(nudged(start, bench.problem.estimation.seed + seed))
+
+
+def begin_again(bench: Bench) -> Json:
+    """Fit the current model again from the guesses; null where that breaks down."""
+    return _better_point(begun_again(bench.current, bench.base.model.space))
+
+
+def _better_point(fitted: FittedModel) -> Json:
     return {"point": point_document(fitted), "objective": plain(fitted.objective)} if fitted.holds else None
 
 

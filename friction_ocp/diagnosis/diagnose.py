@@ -17,7 +17,9 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, fr
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
+from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import explains_more
+from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
@@ -176,7 +178,7 @@ def _diagnosed(problem: Problem, tell: Tell, execution: Execution, readings: Oth
         search = Search(open_bench(problem, run), run, meant, level, tell, patience, readings)
         search.go()
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
-    current, checked = _checked(search.bench.current, meant, level)
+    current, checked = _checked(search.bench.current, base, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     stood, superseded = standing(merged(rounds, checked), accepted)
@@ -209,17 +211,24 @@ def _in_hindsight(found: Diagnosis) -> Diagnosis:
     return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, lost)))
 
 
-def _checked(current: FittedModel, meant: Considered, level: float) -> tuple[FittedModel, list[Round]]:
+def _checked(
+    current: FittedModel, base: FittedModel, meant: Considered, level: float
+) -> tuple[FittedModel, list[Round]]:
     """Take back stated values that the model, once it leaves no more than noise, contradicts.
 
     Before that they may be far off because they stand in for what is missing: be it what a law of slightly another
-    shape leaves, which is too little to be a gap and yet much more than what a value far from its statement costs.
+    shape leaves, which is too little to be a gap and yet much more than what a value far from its statement costs. Or
+    kinks had caught them on their way: a fit from the guesses is better then.
     """
     rounds = list[Round]()
     for _ in range(MOST_PARTS):
         power = innovations(current)
         noise = not power.significant(level) and power.ratio <= DOUBTED
         found = contradictions(current) if noise else []
+        if found and not rounds:
+            again = begun_again(current, base.model.space)
+            current = again if again.objective < current.objective - UNIMPORTANT else current
+            found = contradictions(current)
         if not found:
             break
         fitted, choice = corrected(current, found, meant)

@@ -14,7 +14,9 @@ from friction_ocp.diagnosis.polishing import QUICK, loosely, loosely_joined, pol
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.simulation.grid import FloatArray
 
 SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
@@ -127,6 +129,17 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     if not near and (end.astray or end.footing.segment_s is not None):
         return end
     return freed(polished(end.model, end.footing, end.theta, end.linear.point.nodes))
+
+
+def guessed(current: FittedModel, stated: ParameterSpace) -> FloatArray:
+    """Return the guesses of what the problem states, and what was found of additions to it."""
+    guesses = dict(zip(stated.names, map(float, stated.guess), strict=True))
+    return current.model.space.clip(current.model.space.with_known(current.values | guesses))
+
+
+def begun_again(current: FittedModel, stated: ParameterSpace) -> FittedModel:
+    """Fit the current model from the guesses: what kinks had caught on the way there may be free from here."""
+    return freed(polished(current.model, current.footing, guessed(current, stated), None))
 
 
 def best_nudged(fitted: FittedModel, seed: int) -> FittedModel:
