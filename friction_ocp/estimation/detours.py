@@ -72,7 +72,7 @@ def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     if not is_noise(program, best):
         return fitted
     span = max(float(item.grid.time[-1] - item.grid.time[0]) for item in program.experiments) / WINDOWS
-    cut = windowed(span)(model, program.width, program.loss)
+    cut = windowed(span)(model, 0.0, program.loss)
     watch = phases.begin(f"free runs over {span:.3g} s")
     between = solve_gauss_newton(cut, _anew(cut, best.point), FINE, watch)
     if joined_at_no_cost(Fitted(between, cut), fitted):
