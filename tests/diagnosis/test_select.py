@@ -69,8 +69,8 @@ def test_what_has_all_that_another_has_is_not_named_beside_it() -> None:
 @pytest.mark.parametrize(("play", "first"), [(0.0, "compliance"), (1e-4, "backlash")])
 def test_what_comes_out_as_nothing_is_no_effect(play: float, first: str) -> None:
     """Flanks of a joint without play between them are a spring, however much better the fit of the flanks ended."""
-    spring = rival("compliance", "gear", {"gear.stiffness": np.inf}, gain=5.0)
-    flanks = rival("backlash", "gear", {"gear.stiffness": np.inf, "gear.backlash": 0.0}, gain=6.0)
+    spring = rival("compliance", "gear", {"gear.stiffness": np.inf}, gain=2.0)
+    flanks = rival("backlash", "gear", {"gear.stiffness": np.inf, "gear.backlash": 0.0}, gain=3.0)
     flanks = replace(flanks, standing=replace(flanks.standing, values={"gear.stiffness": 9.0, "gear.backlash": play}))
     assert chosen(spring, flanks).rivals[0].key[0] == first
 
@@ -99,7 +99,7 @@ def test_a_special_case_comes_before_what_contains_it() -> None:
     """As long as the recordings do not exclude it: more parameters that gain a little are no other effect."""
     zero = rival("sensor_offset", "motor_position", {"motor_position.offset": 0.0}, gain=5.0)
     disc = rival("sensor_eccentricity", "motor_position", {"motor_position.offset": 0.0, "wave": 0.0}, gain=3.0)
-    disc = replace(disc, gains=zero.gains + 0.03)
+    disc = replace(disc, gains=zero.gains + 0.03, standing=replace(disc.standing, values={"wave": 0.1}))
     found = chosen(disc, zero)
     assert found.aliases == (zero, disc) and found.rivals[0] is zero
     assert found.probabilities[0] > found.probabilities[1] > 0.0
