@@ -139,7 +139,8 @@ def guessed(current: FittedModel, stated: ParameterSpace) -> FloatArray:
 
 def begun_again(current: FittedModel, stated: ParameterSpace) -> FittedModel:
     """Fit the current model from the guesses: what kinks had caught on the way there may be free from here."""
-    return freed(polished(current.model, current.footing, guessed(current, stated), None))
+    end = polished(current.model, current.footing, guessed(current, stated), None)
+    return freed(end) if end.objective < CLOSE_BY * current.objective else end
 
 
 def best_nudged(fitted: FittedModel, seed: int) -> FittedModel:
