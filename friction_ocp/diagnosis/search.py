@@ -26,6 +26,7 @@ from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.worth import (
+    ALMOST,
     Key,
     gain,
     innovations,
@@ -268,13 +269,15 @@ class Search:
         better.
 
         Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
-        runs that are lost say nothing.
+        runs that are lost say nothing, and against what takes almost all they say no more than that something else is
+        missing.
         """
         base, current = bench.base, bench.current
         if not innovations(current).significant(self.level):
             return True
-        if base.cost - current.cost < PART * (base.cost - 0.5 * samples(base)):
-            return False
+        taken = (base.cost - current.cost) / (base.cost - 0.5 * samples(base))
+        if taken < PART or taken >= ALMOST:
+            return taken >= ALMOST
         before, after = self._left_out(bench)
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 

@@ -35,8 +35,8 @@ ALONE = 0.5
 """Share of the excess of free runs that an addition must take away where nothing is missing from sample to sample: what
 free runs show there has one cause."""
 ALMOST = 0.9
-"""Share of what the innovations have beyond noise from which nothing is left of it that free runs could contradict by
-chance."""
+"""Share of what the innovations have beyond noise from which free runs do not speak against an addition: what is left
+beside it moves them, too."""
 
 Key = tuple[str, str]
 """Effect and component."""
@@ -132,9 +132,9 @@ class Standard:
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
         they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
-        get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where next to
-        nothing is left of the innovations, they have to get worse for certain: runs that drift, or lack a second
-        effect, may do so by chance. For the same reason
+        get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
+        of them is left, they have to get worse for certain: runs that drift may do so by chance. Where almost all of
+        them goes and not all, it is what else is missing that moves the runs. For the same reason
         they have to get better for certain, and by most of what they show, where nothing is missing from sample to
         sample and no slow torque either. What torque noise alone may do to free runs does not speak against an
         addition.
@@ -150,8 +150,10 @@ class Standard:
             told = most
         elif before.lost:
             told = most or after.excess() <= before.excess()
-        elif one_step[1] <= max(DOUBTED - 1.0, (1.0 - ALMOST) * one_step[0]):
+        elif one_step[1] <= DOUBTED - 1.0:
             told = most and shrink(before, after, seed).interval95[1] >= 0.0
+        elif one_step[1] <= (1.0 - ALMOST) * one_step[0]:
+            told = not after.lost
         else:
             told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()
         if told:
