@@ -227,8 +227,8 @@ def _checked(
         found = contradictions(current) if noise else []
         if found and not rounds:
             again = begun_again(current, base.model.space)
-            current = again if again.objective < current.objective - UNIMPORTANT else current
-            found = contradictions(current)
+            if again.objective < current.objective - UNIMPORTANT:
+                current, power, found = again, innovations(again), contradictions(again)
         if not found:
             break
         fitted, choice = corrected(current, found, meant)

@@ -35,18 +35,24 @@ def driven_as_recorded(problem: Problem) -> Problem | None:
 def opened(stated: Problem, driven: Problem) -> list[str]:
     """Return a sentence for a loop that is stated and takes no part."""
     controller = stated.drive.controller
-    if controller is None or driven.drive.controller is not None:
+    if controller is None or not _is_opened(stated, driven):
         return []
     names = [item.name for item in stated.drive.outputs if item.signal == controller.output]
     what = f"the loop acts on the noise of {controller.feedback}, which no simulation repeats"
     return [f"{' and '.join(names)}: as recorded, in the place of the controller's command: {what}"]
 
 
-def in_its_loop(drive: Drive, stated: Drive) -> Drive:
-    """Return a drive with the controller, and the roles of channels, of the one that was stated."""
+def in_its_loop(drive: Drive, stated: Problem, driven: Problem) -> Drive:
+    """Return a drive with the controller, and the roles of channels, that were stated, where its loop was opened."""
+    if not _is_opened(stated, driven):
+        return drive
     known = {item.name: item for item in drive.channels}
-    channels = tuple(_as_stated(known.get(item.name, item), item) for item in stated.channels)
-    return replace(drive, controller=stated.controller, channels=channels)
+    channels = tuple(_as_stated(known.get(item.name, item), item) for item in stated.drive.channels)
+    return replace(drive, controller=stated.drive.controller, channels=channels)
+
+
+def _is_opened(stated: Problem, driven: Problem) -> bool:
+    return stated.drive.controller is not None and driven.drive.controller is None
 
 
 def _as_stated(channel: Channel, stated: Channel) -> Channel:

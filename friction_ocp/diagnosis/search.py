@@ -275,9 +275,11 @@ class Search:
         base, current = bench.base, bench.current
         if not innovations(current).significant(self.level):
             return True
-        taken = (base.cost - current.cost) / (base.cost - 0.5 * samples(base))
-        if taken < PART or taken >= ALMOST:
-            return taken >= ALMOST
+        taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
+        if taken < PART * whole:
+            return False
+        if 0.0 < ALMOST * whole <= taken:
+            return True
         before, after = self._left_out(bench)
         return before.lost or carries_over(before, after, self.bench.problem.estimation.seed)
 

@@ -10,6 +10,7 @@ from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.growth import joined_at_no_cost
+from friction_ocp.estimation.horizon import longest_recording
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
@@ -66,13 +67,15 @@ def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     """Leave an end near the noise that costs more than starts of windows explain: through these windows, and back.
 
     Each stick and slip of a long run makes ends of its own, and shorter runs have fewer. For a right model the windows
-    gain no more than their free starts do, and it stays where it is.
+    gain no more than their free starts do, and it stays where it is; so does one whose windows are as short already.
     """
     program, best = fitted.program, fitted.solution
     if not is_noise(program, best):
         return fitted
-    span = max(float(item.grid.time[-1] - item.grid.time[0]) for item in program.experiments) / WINDOWS
+    span = longest_recording(model) / WINDOWS
     cut = windowed(span)(model, 0.0, program.loss)
+    if all(new.count <= old.count for new, old in zip(cut.segments, program.segments, strict=True)):
+        return fitted
     watch = phases.begin(f"free runs over {span:.3g} s")
     between = solve_gauss_newton(cut, _anew(cut, best.point), FINE, watch)
     if joined_at_no_cost(Fitted(between, cut), fitted):

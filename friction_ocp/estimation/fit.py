@@ -8,7 +8,7 @@ from friction_ocp.estimation.curriculum import may_be_cut
 from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.division import are_alike, divided_afresh, moved_share, reweighed
 from friction_ocp.estimation.growth import drifting
-from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held
+from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held, longest_recording
 from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, laid_for
 from friction_ocp.estimation.noise_level import most_likely, with_levels
@@ -109,10 +109,4 @@ def _fit_once(model: Model, phases: Phases) -> Fitted:
         return hop(model, fit_kept(model, first.builder, phases), phases)
     if held or not fits_free_run(model):
         return hop(model, staged(model, first, phases)[0], phases)
-    return drifting(model, first, _longest(model, span), phases)
-
-
-def _longest(model: Model, span: float | None) -> float:
-    if span is not None:
-        return span
-    return max(float(item.grid.time[-1] - item.grid.time[0]) for item in model.train)
+    return drifting(model, first, longest_recording(model) if span is None else span, phases)

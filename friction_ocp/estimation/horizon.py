@@ -27,6 +27,11 @@ def horizon(model: Model) -> float | None:
     return min(LONGEST_WINDOW, PERIODS * slowest_period(model.drive, model.space, model.problem))
 
 
+def longest_recording(model: Model) -> float:
+    """Return the length of the longest training recording, s."""
+    return max(float(item.grid.time[-1] - item.grid.time[0]) for item in model.train)
+
+
 def judged_alike(model: Model) -> Model:
     """Return a model that states over what time its free runs are judged, and with it all that it is compared with.
 

@@ -110,8 +110,15 @@ def test_a_loop_is_closed_again(tmp_path: Path) -> None:
     assert driven is not None and driven.drive.controller is None
     assert [item.name for item in driven.drive.inputs] == ["current"]
     found = replace(driven.drive, channels=tuple(replace(item, offset=0.1) for item in driven.drive.channels))
-    closed = in_its_loop(found, stated.drive)
+    closed = in_its_loop(found, stated, driven)
     assert closed.controller == stated.drive.controller
     assert [(item.name, item.role) for item in closed.channels] == [(it.name, it.role) for it in stated.drive.channels]
     assert [item.offset for item in closed.channels] == [0.0, 0.1, 0.1, 0.1]
     assert opened(stated, stated) == [] and len(opened(stated, driven)) == 1
+
+
+def test_a_loop_that_was_not_opened_keeps_how_its_set_points_are_read(tmp_path: Path) -> None:
+    """What another reading of the inputs has found is written as it was found."""
+    stated = load_problem(written(tmp_path))
+    turned = replace(stated.drive, channels=tuple(replace(item, hold="linear") for item in stated.drive.channels))
+    assert in_its_loop(turned, stated, replace(stated, drive=turned)) is turned

@@ -52,10 +52,10 @@ def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
     """Stiffness is positive, damping not negative, a ratio not zero."""
     for path, number in case.numbers.items():
         key = next(part for part in reversed(path.split(".")) if part not in _DIRECTIONS and not part.isdigit())
-        adds = path.endswith(_MAY_BE_ZERO) or case.leaves[path].kind == "saturation"
+        may_be_zero = path.endswith(_MAY_BE_ZERO) or case.leaves[path].kind == "saturation"
         impossible = [
-            (key in _POSITIVE and not adds and number <= 0, "must be positive"),
-            ((key in _NOT_NEGATIVE or adds) and number < 0, "must not be negative"),
+            (key in _POSITIVE and not may_be_zero and number <= 0, "must be positive"),
+            ((key in _NOT_NEGATIVE or may_be_zero) and number < 0, "must not be negative"),
             (key in _NOT_ZERO and number == 0, "must not be zero"),
             (key in _BELOW_ONE and not 0 <= number < 1, "must be at least 0 and below 1"),
         ]
