@@ -80,7 +80,7 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
 
 def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
     program, theta = foot.training(model), model.space.clip(theta)
-    start = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    start = solve_nodes(program, program.suggested_point(theta))
     return polished(model, foot, theta, start.nodes, COARSE)
 
 
@@ -96,6 +96,6 @@ def _from_rest(fitted: FittedModel) -> FittedModel:
 def _rough_answer(model: Model) -> tuple[Program, Point]:
     """Fit on loosely joined segments, from the guesses and from short predictions."""
     short = predictions(model, model.train, WIDTHS[0])
-    start = Point(model.space.guess, short.suggested_nodes(model.space.guess))
+    start = short.suggested_point(model.space.guess)
     starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
     return loosely_joined(model, starts)

@@ -18,7 +18,6 @@ from friction_ocp.drive.parts import Motor
 from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.nodes import solve_nodes
-from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.execution.effort import once
@@ -154,7 +153,7 @@ def _smoothers(fitted: FittedModel, samples: int, typical: Mapping[str, float]) 
     options = replace(fitted.model.problem.estimation, segment=samples, process_noise=density, estimated_noise=())
     model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options), noise_levels=())
     program = relaxed(model, items, 0.0, Squares())
-    start = Point(fitted.theta, program.suggested_nodes(fitted.theta))
+    start = program.suggested_point(fitted.theta)
     point = solve_nodes(program, start, SMOOTHING_STEPS)
     return tuple(LinearRecording(program, index, point) for index in range(len(items)))
 

@@ -59,7 +59,7 @@ def finer(model: Model, foot: Footing, starts: Sequence[FloatArray], factor: flo
     From the start, one of some parameters along the measured motion, that gaps wider by a factor lead to the best end.
     """
     program = widened(foot.training(model), factor)
-    points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
+    points = [program.suggested_point(theta) for theta in starts]
     point = min((solve_gauss_newton(program, start, EASY) for start in points), key=lambda end: end.objective).point
     for _ in range(MOST_DIVISIONS):
         cut = _cut_again(foot, program, point)

@@ -50,7 +50,7 @@ def polished(
 
 def begun(program: Program, theta: FloatArray) -> Point:
     """Return parameters with the nodes that fit them best."""
-    point = solve_nodes(program, Point(theta, program.suggested_nodes(theta)))
+    point = solve_nodes(program, program.suggested_point(theta))
     return joined(program, settled(program, point))
 
 
@@ -73,7 +73,7 @@ def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program,
     is short, and leads near it.
     """
     program = relaxed(model, model.train, 0.0, Squares())
-    ends = [solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), COARSE) for theta in starts]
+    ends = [solve_gauss_newton(program, program.suggested_point(theta), COARSE) for theta in starts]
     return program, min(ends, key=lambda end: end.objective).point
 
 

@@ -87,7 +87,7 @@ def _renewed(model: Model, program: Program, end: Solution, phases: Phases) -> t
 def _mismatch(model: Model, item: Experiment, theta: FloatArray) -> float:
     """Return the cost of a recording over its samples where every segment starts along the measured motion."""
     program = replace(relaxed(model, (item,), 0.0, Squares()), static=())
-    cost = program.objective(Point(theta, program.suggested_nodes(theta)))
+    cost = program.objective(program.suggested_point(theta))
     return cost / max(int(np.isfinite(item.measured).sum()), 1)
 
 

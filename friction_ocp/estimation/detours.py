@@ -77,17 +77,12 @@ def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     if all(new.count <= old.count for new, old in zip(cut.segments, program.segments, strict=True)):
         return fitted
     watch = phases.begin(f"free runs over {span:.3g} s")
-    between = solve_gauss_newton(cut, _anew(cut, best.point), FINE, watch)
+    between = solve_gauss_newton(cut, cut.suggested_point(best.point.theta), FINE, watch)
     if joined_at_no_cost(Fitted(between, cut), fitted):
         return fitted
-    end = final_solver(model)(program, _anew(program, between.point), limits(model), watch)
+    end = final_solver(model)(program, program.suggested_point(between.point.theta), limits(model), watch)
     iterations = best.iterations + between.iterations + end.iterations
     return replace(fitted, solution=replace(min(best, end, key=lambda item: item.objective), iterations=iterations))
-
-
-def _anew(program: Program, point: Point) -> Point:
-    """Return the parameters with the nodes that another program suggests for them."""
-    return Point(point.theta, program.suggested_nodes(point.theta))
 
 
 def hop(model: Model, fitted: Fitted, phases: Phases) -> Fitted:

@@ -19,7 +19,6 @@ from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare, prepare_fit
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.sampling_limit import beyond_sampling
@@ -138,7 +137,7 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
 def _last_iterate(model: Model, reports: list[Report]) -> Fitted:
     program = program_builder(model)(model, 0.0, Squares())
     theta = reports[0].point.theta if reports else model.space.guess
-    point = Point(theta, program.suggested_nodes(theta))
+    point = program.suggested_point(theta)
     where = f"in phase '{reports[0].phase}', iteration {reports[0].iteration}" if reports else "before the first step"
     return Fitted(Solution(point, program.objective(point), 0, False, f"interrupted {where}"), program)
 

@@ -92,7 +92,7 @@ def survey(model: Model) -> Survey | None:
     views: list[View] = []
     for theta in _thetas(model.space)[: None if steps <= FEW_STEPS else 1]:
         for program in programs:
-            point = Point(theta, program.suggested_nodes(theta))
+            point = program.suggested_point(theta)
             with np.errstate(all="ignore"):
                 system = program.linearise(point)
             if np.isfinite(system.objective) and np.all(np.isfinite(system.theta_theta)):

@@ -112,7 +112,7 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
 
 def _better_start(model: Model, program: Program, point: Point) -> Point:
     """Return the point, or the guesses where these explain more: short predictions may end in nonsense."""
-    guess = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    guess = program.suggested_point(model.space.guess)
     return min(point, guess, key=program.objective)
 
 

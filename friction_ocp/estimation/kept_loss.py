@@ -76,7 +76,7 @@ def _least_squares(program: Program, predicted: Solution, watch: Watch) -> Solut
 
 
 def _started(program: Program, theta: FloatArray) -> Point:
-    return Point(theta, program.suggested_nodes(theta))
+    return program.suggested_point(theta)
 
 
 def _on_grid(program: Program, end: Solution) -> FloatArray:

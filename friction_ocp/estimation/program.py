@@ -128,6 +128,10 @@ class Program:
         pairs = zip(self.experiments, self.segments, strict=True)
         return tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
 
+    def suggested_point(self, theta: FloatArray) -> Point:
+        """Return the parameters with the nodes that are suggested for them."""
+        return Point(theta, self.suggested_nodes(theta))
+
     def measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""
         states, active = self.sweep.start.size1_out(0), len(self.space.active)

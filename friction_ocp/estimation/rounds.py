@@ -141,7 +141,7 @@ def _predicted(model: Model, phases: Phases) -> FloatArray:
 def prediction(model: Model, phases: Phases) -> Fitted:
     """Fit what best predicts the smoothed motion over short times."""
     program = predictions(model, model.train, WIDTHS[0])
-    start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    start = program.suggested_point(model.space.guess)
     return Fitted(solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")), program)
 
 
@@ -151,7 +151,7 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     Return the ends, best first; the iterations of all are booked on each.
     """
     program = plan.builder(model, plan.widths[0], Squares())
-    points = [Point(theta, program.suggested_nodes(theta)) for theta in starts]
+    points = [program.suggested_point(theta) for theta in starts]
     points.sort(key=lambda point: mean_error(program, point))
     rounds = max(len(plan.widths), len(roundings_of(model)))
     iterations, ends = 0, list[Solution]()

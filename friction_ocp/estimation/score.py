@@ -59,7 +59,7 @@ def simulate_recordings(
         return ()
     span = horizon(model)
     program = free_run(model, experiments, width, Squares(), span)
-    point = Point(theta, program.suggested_nodes(theta))
+    point = program.suggested_point(theta)
     if not fits_free_run(model):
         point = _smoothed(model, experiments, program, point)
     elif span is None:
@@ -78,7 +78,7 @@ def simulate_recordings(
 def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Program, point: Point) -> Point:
     """Start every window from the state that the relaxed program smooths out of the measurement."""
     smoother = relaxed(model, experiments, 0.0, Squares())
-    solved = solve_nodes(smoother, Point(point.theta, smoother.suggested_nodes(point.theta)))
+    solved = solve_nodes(smoother, smoother.suggested_point(point.theta))
     return program.point_along(smoother, solved)
 
 

@@ -15,7 +15,6 @@ from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.problem import Problem, RecordingUse
-from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray
@@ -86,8 +85,8 @@ def _linear(fitted: FittedModel, recording: Recording) -> LinearProgram:
     foot = replace(footing(model, theta), segment_s=fitted.footing.segment_s)
     program = foot.program(model, model.train)
     freely = free_run(model, model.train, 0.0, Squares(), None)
-    alone = program.point_along(freely, Point(theta, freely.suggested_nodes(theta)))
-    starts = [Point(theta, program.suggested_nodes(theta)), alone]
+    alone = program.point_along(freely, freely.suggested_point(theta))
+    starts = [program.suggested_point(theta), alone]
     return linear_program(program, min((solve_nodes(program, start) for start in starts), key=program.objective))
 
 

@@ -29,7 +29,7 @@ from tracing import Curve, Trace, counted, draw
 from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.progress import Report
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.problem_file.load import load_problem
@@ -78,7 +78,7 @@ class FreeRun:
     def rms(self, numbers: Numbers) -> float:
         """Return the root mean square of the error of the angle, rad."""
         theta = np.array([numbers[name.rpartition(".")[2]] for name in self.model.space.names])
-        point = Point(theta, self.program.suggested_nodes(theta))
+        point = self.program.suggested_point(theta)
         errors = self.program.simulate(0, point).y[:, 0] - self.model.train[0].measured[:, 0]
         return float(np.sqrt(np.nanmean(errors**2)))
 

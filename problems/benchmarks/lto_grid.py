@@ -34,7 +34,7 @@ from friction_ocp.estimation.agreement import curve_distance
 from friction_ocp.estimation.estimate import identify
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
-from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.progress import Report
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.problem_file.load import load_problem
@@ -114,7 +114,7 @@ class GridSearch:
     def misfit(self, values: Numbers) -> float:
         """Return the distance d of eq. 15, both curves scaled to equal rms: the accelerometer's scale is unknown."""
         theta = np.array([values[name] for name in self.model.space.names])
-        point = Point(theta, self.program.suggested_nodes(theta))
+        point = self.program.suggested_point(theta)
         simulated = self.program.simulate(0, point).y[:, 0]
         scale = np.sqrt(np.mean(self.measured**2) / max(float(np.mean(simulated**2)), 1e-12))
         window = (self.time > DATA.STOP_AT - 0.05) & (self.time < DATA.STOP_AT + 3.0)
@@ -239,7 +239,7 @@ def _held_out(problem: Problem, values: Numbers) -> float:
     model = prepare(replace(problem, train=problem.validation, validation=(), static=(), static_validation=()))
     program = free_run(model, model.train, 0.0, Squares(), None)
     theta = np.array([values[name] for name in model.space.names])
-    errors = program.simulate(0, Point(theta, program.suggested_nodes(theta))).y[:, 0] - model.train[0].measured[:, 0]
+    errors = program.simulate(0, program.suggested_point(theta)).y[:, 0] - model.train[0].measured[:, 0]
     return float(np.sqrt(np.nanmean(errors**2)))
 
 

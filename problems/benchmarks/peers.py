@@ -32,7 +32,6 @@ from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.losses import Squares
@@ -129,7 +128,7 @@ def judged(case: Case, found: Measured) -> Measured:
         return replace(found, merit=errors[0], validation=errors[1])
     pinned = replace(model, space=replace(model.space, guess=theta, lower=theta, upper=theta))
     program = relaxed(pinned, model.train, 0.0, Squares())
-    end = solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)))
+    end = solve_gauss_newton(program, program.suggested_point(theta))
     worst = np.nan
     if case.reference is not None:
         own = np.array([found.values[name] for name in case.names])

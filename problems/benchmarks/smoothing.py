@@ -28,7 +28,6 @@ from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import EstimationOptions, Problem, RecordingUse
-from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.estimation.whiteness import whiteness
 from friction_ocp.friction.element import FrictionElement
@@ -103,7 +102,7 @@ def smoothed(problem: Problem, answer: Estimate) -> list[Smoothed]:
     found: list[Smoothed] = []
     for width in WIDTHS:
         program = free_run(model, model.train, width, Squares(), horizon(model))
-        end = solve_gauss_newton(program, Point(theta, program.suggested_nodes(theta)), TIGHT).point
+        end = solve_gauss_newton(program, program.suggested_point(theta), TIGHT).point
         residual = program.residuals(0, program.simulate(0, end).y)[:, 0]
         seen = np.isfinite(residual)
         found.append(Smoothed(width, end.theta, whiteness(model.train[0].grid.time[seen], residual[seen]).p_value))

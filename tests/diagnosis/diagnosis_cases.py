@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import yaml
 from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory, steps_and_multisine
 
+from friction_ocp.cli import main
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -80,3 +82,9 @@ def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str]
     path = folder / "problem.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path
+
+
+def diagnosed(path: Path) -> dict[str, Any]:
+    """Return the result document of a diagnosis by command, its folder `out` beside the problem."""
+    assert main(["diagnose", str(path), "--out", str(path.parent / "out")]) == 0
+    return json.loads((path.parent / "out" / "result.json").read_text(encoding="utf-8"))

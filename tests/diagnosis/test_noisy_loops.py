@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import CURRENT_NOISE, ENCODER_STEP, SECONDS, STEP, axis, write_case
+from diagnosis_cases import CURRENT_NOISE, ENCODER_STEP, SECONDS, STEP, axis, diagnosed, write_case
 from plant import Plant, PlantController, PlantSensor, Trajectory, reversing_steps
 
-from friction_ocp.cli import main
 from friction_ocp.diagnosis.loop import driven_as_recorded, in_its_loop, opened
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -63,11 +61,6 @@ def written(folder: Path, unbalance: float = 0.0) -> Path:
     document["channels"] = CHANNELS
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path
-
-
-def diagnosed(path: Path) -> dict[str, Any]:
-    assert main(["diagnose", str(path), "--out", str(path.parent / "out")]) == 0
-    return json.loads((path.parent / "out" / "result.json").read_text(encoding="utf-8"))
 
 
 def test_the_noise_of_a_loop_is_no_gap(tmp_path: Path) -> None:

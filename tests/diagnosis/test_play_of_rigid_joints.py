@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from diagnosis_cases import ENCODER_STEP, STEP, axis, record, write_case
+from diagnosis_cases import ENCODER_STEP, STEP, axis, diagnosed, record, write_case
 from plant import Plant, PlantFriction, PlantSensor, PlantShaft, PlantTransmission
 
-from friction_ocp.cli import main
 from friction_ocp.recording.hdf5 import write_recording
 
 RATIO, LOAD, PLAY = 5.0, 0.05, 0.02
@@ -28,7 +26,7 @@ def geared(stiffness: float, play: float) -> Plant:
     return replace(plain, shafts=(*plain.shafts, load), transmissions=(gear,), sensors=(*plain.sensors, seen))
 
 
-def diagnosed(folder: Path, plant: Plant) -> dict[str, Any]:
+def without_play(folder: Path, plant: Plant) -> dict[str, Any]:
     """Return the result document of a diagnosis whose model has a rigid gear."""
     path = write_case(folder, axis(), effects=["backlash", "compliance", "sensor_delay", "unbalance"])
     for k, name in enumerate("abc"):
@@ -39,14 +37,13 @@ def diagnosed(folder: Path, plant: Plant) -> dict[str, Any]:
     document["drive"]["transmissions"] = [{"ratio": RATIO, "stiffness": "rigid"}]
     document["channels"]["load_position"] = {"measures": "load.theta", "resolution": ENCODER_STEP}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    assert main(["diagnose", str(path), "--out", str(folder / "out")]) == 0
-    return json.loads((folder / "out" / "result.json").read_text(encoding="utf-8"))
+    return diagnosed(path)
 
 
 @pytest.mark.slow
 def test_play_is_told_from_a_spring(tmp_path: Path) -> None:
     """Hard flanks with play between them are backlash, its size within a tenth."""
-    result = diagnosed(tmp_path, geared(3000.0, PLAY))
+    result = without_play(tmp_path, geared(3000.0, PLAY))
     (accepted,) = result["accepted"]
     assert (accepted["effect"], accepted["component"]) == ("backlash", "motor-load")
     assert accepted["parameters"]["motor-load.backlash"]["value"] == pytest.approx(PLAY, rel=0.1)
@@ -55,6 +52,6 @@ def test_play_is_told_from_a_spring(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_spring_is_no_play(tmp_path: Path) -> None:
     """A soft joint without play is compliance: play that comes out as none takes nothing away from it."""
-    result = diagnosed(tmp_path, geared(40.0, 0.0))
+    result = without_play(tmp_path, geared(40.0, 0.0))
     assert [(item["effect"], item["component"]) for item in result["accepted"]] == [("compliance", "motor-load")]
     assert not result["alias_sets"]

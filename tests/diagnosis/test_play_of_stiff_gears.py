@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from diagnosis_cases import diagnosed
 from plant import (
     Plant,
     PlantController,
@@ -19,7 +19,6 @@ from plant import (
     Trajectory,
 )
 
-from friction_ocp.cli import main
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -98,8 +97,7 @@ def test_play_is_found_where_no_small_play_predicts_it(tmp_path: Path) -> None:
         write_recording(record(name, 10 + k), tmp_path / f"{name}.h5")
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(document(), sort_keys=False), encoding="utf-8")
-    assert main(["diagnose", str(path), "--out", str(tmp_path / "out")]) == 0
-    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    result = diagnosed(path)
     (accepted,) = result["accepted"]
     assert (accepted["effect"], accepted["component"]) == ("backlash", "motor-load")
     assert accepted["parameters"]["motor-load.backlash"]["value"] == pytest.approx(PLAY, rel=0.01)

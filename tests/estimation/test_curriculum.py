@@ -55,7 +55,7 @@ def test_the_answer_is_that_of_all_recordings_at_once(model: Model) -> None:
     solution, program = curriculum.introduced(model, Phases(silent, 1))
     assert tuple(item.name for item in program.experiments) == NAMES
     assert solution.objective == pytest.approx(program.objective(solution.point), rel=1e-9)
-    start = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    start = program.suggested_point(model.space.guess)
     at_once = solve_gauss_newton(program, start)
     assert solution.objective == pytest.approx(at_once.objective, rel=1e-5)
     assert solution.point.theta == pytest.approx(at_once.point.theta, rel=2e-2)

@@ -66,7 +66,7 @@ def test_the_motion_goes_through_the_new_nodes() -> None:
     """Gaps appear nowhere: what the parts simulate is what the whole segments did."""
     model = model_with(np.pi)
     program, _ = start_of(model)
-    point = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    point = program.suggested_point(model.space.guess)
     cut, start = divided(model, program, point)
     before, after = program.simulate(0, point), cut.simulate(0, start)
     assert after.y == pytest.approx(before.y, abs=1e-9 * np.max(np.abs(before.y)))

@@ -65,7 +65,7 @@ def model() -> Model:
 
 def start(program: Program) -> Point:
     """Return the guesses with the nodes that the measurement suggests."""
-    return Point(program.space.guess, program.suggested_nodes(program.space.guess))
+    return program.suggested_point(program.space.guess)
 
 
 @pytest.mark.parametrize("kind", ["relaxed", "free run", "free run in windows", "measured starts"])

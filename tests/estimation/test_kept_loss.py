@@ -35,7 +35,7 @@ def program(model: Model) -> Program:
 
 
 def start(program: Program) -> Point:
-    return Point(program.space.guess, program.suggested_nodes(program.space.guess))
+    return program.suggested_point(program.space.guess)
 
 
 @pytest.mark.parametrize("bound", [np.inf, 0.4])

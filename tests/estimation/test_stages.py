@@ -93,7 +93,7 @@ def test_the_gradient_is_that_of_the_objective(kind: str) -> None:
         "predictions": lambda: predictions(model, model.train, 0.1),
     }
     program = builders[kind]()
-    point = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    point = program.suggested_point(model.space.guess)
     system = program.linearise(point)
     assert system.objective == pytest.approx(program.objective(point))
     for k, size in enumerate(1e-6 * model.space.guess):
@@ -111,6 +111,6 @@ def test_the_gradient_is_that_of_the_objective(kind: str) -> None:
 def test_the_mean_error_is_in_noise_floors(model: Model) -> None:
     """It is the mean absolute error of all samples that there are."""
     program = predictions(model, model.train, 0.0)
-    point = Point(model.space.guess, program.suggested_nodes(model.space.guess))
+    point = program.suggested_point(model.space.guess)
     errors = [program.residuals(k, program.simulate(k, point).y) for k in range(2)]
     assert mean_error(program, point) == pytest.approx(np.mean(np.abs(np.concatenate(errors))))

@@ -21,7 +21,6 @@ from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.problem import RecordingUse
-from friction_ocp.estimation.program import Point
 from friction_ocp.excitation.design import Design, design
 from friction_ocp.excitation.worth import evidence
 from friction_ocp.problem_file.load import load_problem
@@ -73,7 +72,7 @@ def test_the_plant_confirms_the_expected_standard_errors(sharper: Design) -> Non
     problem = replace(fitted.model.problem, train=(RecordingUse(made),), validation=())
     model = prepare(problem)
     program = footing(model, fitted.theta).program(model, model.train)
-    linear = linear_program(program, solve_nodes(program, Point(fitted.theta, program.suggested_nodes(fitted.theta))))
+    linear = linear_program(program, solve_nodes(program, program.suggested_point(fitted.theta)))
     known = fitted.linear.rows.jacobian
     both = known.T @ known + linear.rows.jacobian.T @ linear.rows.jacobian
     assert option.std_errors is not None
