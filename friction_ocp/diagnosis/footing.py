@@ -152,15 +152,15 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
     power = {shaft: options.process_noise[shaft] ** 2 for shaft in sorted(stated)}
     for motor in model.problem.drive.motors:
         for channel in model.problem.drive.inputs:
-            factor = _torque_factor(motor, channel, numbers)
+            factor = torque_factor(motor, channel, numbers)
             if factor is None:
                 continue
-            std, step = _input_noise(model, channel)
+            std, step = input_noise(model, channel)
             power[motor.shaft] = power.get(motor.shaft, 0.0) + (factor * std) ** 2 * step
     return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
 
 
-def _torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float]) -> float | None:
+def torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float]) -> float | None:
     """Return the torque of a motor per unit that an input channel shows; None where the channel does not drive it.
 
     What a channel with a gain shows is that much more than what drives the motor.
@@ -172,7 +172,7 @@ def _torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float])
     return None if factor is None else factor / (numbers.get(f"{channel.name}.gain", 1.0) or 1.0)
 
 
-def _input_noise(model: Model, channel: Channel) -> tuple[float, float]:
+def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
     """Return the noise floor of an input and its sampling interval."""
     signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
     step = float(np.median(np.diff(signals[0].time)))
@@ -269,12 +269,12 @@ def input_impulses(model: Model, item: Experiment, numbers: Mapping[str, float])
     found: dict[str, FloatArray] = {}
     for motor in drive.motors:
         for channel in drive.inputs:
-            factor = _torque_factor(motor, channel, numbers)
+            factor = torque_factor(motor, channel, numbers)
             if factor is None or channel.hold == "zero":
                 continue
             column = model.drive.input_names.index(channel.name)
             bend = np.abs(np.diff(item.grid.at_node[:, column], 2, prepend=np.nan, append=np.nan))
-            std, _ = _input_noise(model, channel)
+            std, _ = input_noise(model, channel)
             jump = np.fmax(bend, np.append(bend[1:], np.nan))
             jump = np.where(jump > SMOOTH * std, np.nan_to_num(jump), 0.0)
             impulse = factor * jump * item.grid.dt / np.sqrt(12.0)

@@ -37,6 +37,8 @@ class Rounding:
     A counter that shows the same while the drive stands still or turns back errs by the same.
     """
     counters: tuple[Counter, ...] = ()
+    inputs: FloatArray | None = None
+    """(rows, errors) what slow errors of rounded inputs, each of deviation 1, do to the rows."""
 
     def covariance(self, columns: FloatArray) -> FloatArray:
         """Return (k, k) the covariance of the sums of noise over columns (rows, k).
@@ -45,6 +47,9 @@ class Rounding:
         along their sum, and none beside it; the latter is left as it is for noise that is not.
         """
         known = columns.T @ columns + self._shared(columns)
+        if self.inputs is not None:
+            by_inputs: FloatArray = columns.T @ self.inputs
+            known += by_inputs @ by_inputs.T
         return known + _positive(self._beating(columns), known) if self.counters else known
 
     def _shared(self, columns: FloatArray) -> FloatArray:
@@ -99,12 +104,21 @@ def _step(fitted: FittedModel, channel: int, values: FloatArray) -> float | None
 
 
 def _counter(item: LinearRecording, channel: int, step: float, rows: IntArray, nodes: IntArray) -> Counter:
-    """Return a counter; what else is noise in it blurs the finer waves."""
-    waves, noise = np.arange(1.0, WAVES + 1.0), float(item.noise[channel])
+    """Return a counter."""
+    powers = wave_powers(step, float(item.noise[channel]))
+    return Counter(rows, item.y[nodes, channel] / step, powers)
+
+
+def wave_powers(step: float, noise: float) -> FloatArray:
+    """Return (waves,) the share of a noise floor in each wave of the error of rounding to whole steps.
+
+    What else is noise in the floor blurs the finer waves.
+    """
+    waves = np.arange(1.0, WAVES + 1.0)
     share = step**2 / 12.0 / noise**2
     other = max(noise**2 - step**2 / 12.0, 0.0) / step**2
     powers: FloatArray = min(share, 1.0) * 6.0 / (np.pi * waves) ** 2 * np.exp(-((2.0 * np.pi * waves) ** 2) * other)
-    return Counter(rows, item.y[nodes, channel] / step, powers)
+    return powers
 
 
 def _positive(change: FloatArray, known: FloatArray) -> FloatArray:

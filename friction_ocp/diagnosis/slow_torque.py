@@ -8,7 +8,7 @@ makes of them, and with that of the other places.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.input_rounding import STRETCHES, input_columns, stretch_of
 from friction_ocp.diagnosis.rounding import Rounding, rounding_of
 from friction_ocp.drive.parts import Channel, Drive, ExternalTorque, KinematicError, Shaft
 from friction_ocp.effects.effect import (
@@ -29,14 +30,13 @@ from friction_ocp.effects.effect import (
 from friction_ocp.parameters import start_of
 from friction_ocp.simulation.grid import FloatArray
 
-STRETCHES = 24
-"""In each recording, a constant in each."""
 SHARE = 0.05
 """Size of a constant, over what is typical there, at which it is simulated: small enough to be linear."""
 FAR = 1e9
 """Period of a wave that is a constant wherever a drive goes, rad."""
-TOLD = 1e-10
-"""Power of a combination of constants over the largest one below which it is rounding."""
+TOLD = 1e-4
+"""Power of a combination of constants over the largest one below which it says nothing: where parameters absorb all but
+a hundredth of it, noise of the inputs and the model's curvature make what is left."""
 DEVIATIONS = 10.0
 """Size of a channel's constant over its noise floor at which it is simulated."""
 
@@ -65,8 +65,14 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
     """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
     if fitted.footing.segment_s is None:
         return ()
-    rounding = rounding_of(fitted)
-    return tuple(slow_torque_of(fitted, probe, rounding) for probe in probes(fitted, clues))
+    places = {probe.component: (probe, stretched(fitted, probe)) for probe in probes(fitted, clues)}
+    by_torque = {
+        name: columns / (SHARE * clues.typical_torque[name])
+        for name, (_, columns) in places.items()
+        if name in clues.typical_torque
+    }
+    rounding = replace(rounding_of(fitted), inputs=input_columns(fitted, by_torque))
+    return tuple(slow_torque_of(fitted, probe, columns, rounding) for probe, columns in places.values())
 
 
 def significant(found: Sequence[SlowTorque], level: float) -> bool:
@@ -109,16 +115,18 @@ def _number(fitted: FittedModel, path: str, stated: object) -> float:
     return fitted.values.get(path, float(guess) if isinstance(guess, (int, float)) else 0.0)
 
 
-def slow_torque_of(fitted: FittedModel, probe: Probe, rounding: Rounding) -> SlowTorque:
-    """Test one place; samples share what `rounding` says."""
+def stretched(fitted: FittedModel, probe: Probe) -> FloatArray:
+    """Return (rows, stretches) what the constant of a place does to the residuals, over each stretch alone.
+
+    The stretches of all recordings are numbered through; parameters and node states have absorbed what they can.
+    """
     built = contrast(fitted.model, fitted.linear, probe.drive)
     rows = fitted.linear.rows
     theta, columns, begin = built.theta(probe.values), list[FloatArray](), 0
     recordings = fitted.linear.recordings
     tracks = built.simulate([(index, theta) for index in range(len(recordings))])
     for item, track in zip(recordings, tracks, strict=True):
-        stretch = (np.arange(item.cut.count) * STRETCHES) // item.cut.count
-        marks = (stretch[:, None] == np.arange(STRETCHES)).astype(float)
+        marks = (stretch_of(item)[:, None] == np.arange(STRETCHES)).astype(float)
         by_end = (track.end - item.end)[:, :, None] * marks[:, None, :]
         by_y = (track.y - item.y)[:, :, None] * marks[item.segment][:, None, :]
         own = item.change(by_y, by_end)
@@ -126,17 +134,17 @@ def slow_torque_of(fitted: FittedModel, probe: Probe, rounding: Rounding) -> Slo
         whole[begin : begin + own.shape[0]] = own
         columns.append(whole)
         begin += own.shape[0]
-    return _tested(probe.component, fitted, rows.absorbed(np.concatenate(columns, axis=1)), rounding)
+    return rows.absorbed(np.concatenate(columns, axis=1))
 
 
-def _tested(place: str, fitted: FittedModel, columns: FloatArray, rounding: Rounding) -> SlowTorque:
-    """Test amplitudes against what noise makes of them."""
+def slow_torque_of(fitted: FittedModel, probe: Probe, columns: FloatArray, rounding: Rounding) -> SlowTorque:
+    """Test the amplitudes of one place, which do `columns`, against what noise makes of them; see `rounding`."""
     rows = fitted.linear.rows
     powers, axes = np.linalg.eigh(rounding.covariance(columns))
     told = powers > TOLD * max(float(powers[-1]), 1e-300)
     freedom = int(np.sum(told))
     if freedom == 0:
-        return SlowTorque(place, 1.0, 1.0)
+        return SlowTorque(probe.component, 1.0, 1.0)
     amplitudes = axes[:, told].T @ (columns.T @ rows.residual) / np.sqrt(powers[told])
     ratio = float(np.mean(amplitudes**2))
-    return SlowTorque(place, ratio, float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom)))
+    return SlowTorque(probe.component, ratio, float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom)))

@@ -7,19 +7,42 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_cases import SECONDS, TORQUE_CONSTANT, axis, record, write_case
+import yaml
+from diagnosis_cases import CURRENT_NOISE, SECONDS, TORQUE_CONSTANT, axis, record, write_case
+from plant import Plant, Trajectory
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.rounding import Rounding
-from friction_ocp.diagnosis.slow_torque import STRETCHES, SlowTorque, probes, significant, slow_torque_of, slow_torques
+from friction_ocp.diagnosis.input_rounding import STRETCHES
+from friction_ocp.diagnosis.rounding import Rounding, rounding_of
+from friction_ocp.diagnosis.slow_torque import (
+    STRETCHES,
+    SlowTorque,
+    probes,
+    significant,
+    slow_torque_of,
+    slow_torques,
+    stretched,
+)
 from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
+COARSE = 0.03
+"""Counts of a current, A."""
 GUSTS = 0.01
 """Deviation of the unknown torque, N m, from half second to half second."""
+
+
+def plateaus(plant: Plant, name: str, seed: int) -> Recording:
+    """Run a plant on a current that stays at each of eight levels, both ways in turn."""
+    rng = np.random.default_rng(seed)
+    levels = rng.uniform(0.32, 0.5, 8) * np.where(np.arange(8) % 2, -1.0, 1.0)
+    current = Trajectory(np.arange(8) * SECONDS / 8.0, levels, "zero")
+    run = plant.simulate(SECONDS, {"motor.current": current}, rng)
+    units = {"position": "rad", "current": "A"}
+    return Recording(name, {key: Channel(key, *run.channels[key], unit) for key, unit in units.items()})
 
 
 def found(path: Path) -> SlowTorque:
@@ -46,8 +69,31 @@ def test_coarse_counts_are_no_slow_error(tmp_path: Path) -> None:
     clues = clues_of(fitted)
     assert all(item.p_value > 0.01 for item in slow_torques(fitted, clues))
     probe = next(item for item in probes(fitted, clues) if item.component == "position")
-    white = slow_torque_of(fitted, probe, Rounding(np.full(fitted.linear.rows.residual.size, -1)))
+    white = slow_torque_of(
+        fitted, probe, stretched(fitted, probe), Rounding(np.full(fitted.linear.rows.residual.size, -1))
+    )
     assert white.p_value < 1e-6, "the stays are what makes the difference"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_coarse_current_is_no_slow_torque(seed: int, tmp_path: Path) -> None:
+    """A current in counts of 30 mA, hardly any noise in it, errs by the same where it stays; that is no torque."""
+    plain = axis()
+    coarse = replace(plain.sensors[1], resolution=COARSE)
+    plant = replace(plain, sensors=(plain.sensors[0], coarse))
+    path = write_case(tmp_path, plant, seed)
+    for k, name in enumerate("abc"):
+        write_recording(plateaus(plant, name, 10 * seed + k), tmp_path / f"{name}.h5")
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["channels"]["current"] |= {"noise_std": float(np.hypot(CURRENT_NOISE, COARSE / np.sqrt(12.0)))}
+    document["channels"]["current"] |= {"resolution": COARSE}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    fitted = fit_base(prepare(load_problem(path)))
+    clues = clues_of(fitted)
+    assert all(item.p_value > 0.01 for item in slow_torques(fitted, clues))
+    probe = next(item for item in probes(fitted, clues) if item.component == "motor")
+    white = slow_torque_of(fitted, probe, stretched(fitted, probe), rounding_of(fitted))
+    assert white.p_value < 1e-4, "the rounding of the current is what makes the difference"
 
 
 def test_gusts_are_seen(tmp_path: Path) -> None:
