@@ -32,8 +32,8 @@ SMALL = 1.0 / 16.0
 def input_columns(fitted: FittedModel, by_torque: Mapping[str, FloatArray]) -> FloatArray:
     """Return (rows, errors) what errors of rounding of measured inputs do slowly, each of deviation 1.
 
-    `by_torque` (rows, stretches) holds by shaft what a torque of 1 N m over each stretch alone does. Where in a count an
-    input stays is not known: its mean error over a stay is anything of its deviation.
+    `by_torque` (rows, stretches) holds by shaft what a torque of 1 N m over each stretch alone does. Where in a count
+    an input stays is not known: its mean error over a stay is anything of its deviation.
     """
     model, found = fitted.model, [np.zeros((fitted.linear.rows.residual.size, 0))]
     numbers = fitted.footing.numbers[model.train[0].name]
@@ -75,7 +75,8 @@ def _mean_errors(fitted: FittedModel, channel: Channel, step: float) -> FloatArr
         smooth = _smooth(item.item.grid.at_node[:, column], noise, step)
         sizes = np.sqrt(powers @ np.abs(np.exp(waves * smooth) @ marks.T) ** 2)
         stay = _stays(np.array([np.median(smooth[stretch == k]) for k in range(STRETCHES)]), step)
-        found.append((stay[:, None] == np.arange(stay[-1] + 1)) * sizes[:, None])
+        of_stay: FloatArray = (stay[:, None] == np.arange(stay[-1] + 1)) * sizes[:, None]
+        found.append(of_stay)
     return np.asarray(linalg.block_diag(*found))
 
 

@@ -16,7 +16,6 @@ from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.input_rounding import STRETCHES
 from friction_ocp.diagnosis.rounding import Rounding, rounding_of
 from friction_ocp.diagnosis.slow_torque import (
-    STRETCHES,
     SlowTorque,
     probes,
     significant,
