@@ -73,10 +73,9 @@ def _mean_errors(fitted: FittedModel, channel: Channel, step: float) -> FloatArr
         marks = (stretch == np.arange(STRETCHES)[:, None]).astype(float)
         marks /= np.maximum(marks.sum(axis=1, keepdims=True), 1.0)
         smooth = _smooth(item.item.grid.at_node[:, column], noise, step)
-        sizes = np.sqrt(powers @ np.abs(np.exp(waves * smooth) @ marks.T) ** 2)
+        sizes: FloatArray = np.sqrt(powers @ np.abs(np.exp(waves * smooth) @ marks.T) ** 2)
         stay = _stays(np.array([np.median(smooth[stretch == k]) for k in range(STRETCHES)]), step)
-        of_stay: FloatArray = (stay[:, None] == np.arange(stay[-1] + 1)) * sizes[:, None]
-        found.append(of_stay)
+        found.append(np.where(stay[:, None] == np.arange(stay[-1] + 1), sizes[:, None], 0.0))
     return np.asarray(linalg.block_diag(*found))
 
 
