@@ -75,7 +75,9 @@ def _mean_errors(fitted: FittedModel, channel: Channel, step: float) -> FloatArr
         smooth = _smooth(item.item.grid.at_node[:, column], noise, step)
         sizes: FloatArray = np.sqrt(powers @ np.abs(np.exp(waves * smooth) @ marks.T) ** 2)
         stay = _stays(np.array([np.median(smooth[stretch == k]) for k in range(STRETCHES)]), step)
-        found.append(np.where(stay[:, None] == np.arange(stay[-1] + 1), sizes[:, None], 0.0))
+        of_stay = np.zeros((STRETCHES, int(stay[-1]) + 1))
+        of_stay[np.arange(STRETCHES), stay] = sizes
+        found.append(of_stay)
     return np.asarray(linalg.block_diag(*found))
 
 

@@ -10,7 +10,8 @@ from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.easing import eased
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
-from friction_ocp.diagnosis.polishing import QUICK, loosely, loosely_joined, polished, timed
+from friction_ocp.diagnosis.led_back import led_back
+from friction_ocp.diagnosis.polishing import QUICK, UNIMPORTANT, loosely, loosely_joined, polished, timed
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import Model, with_drive
@@ -149,7 +150,13 @@ def best_nudged(fitted: FittedModel, seed: int) -> FittedModel:
 
 
 def without_addition(current: FittedModel, drive: Drive) -> FittedModel:
-    """Fit a drive that lacks something that the current model has."""
+    """Fit a drive that lacks something that the current model has.
+
+    From where its parameters are now and, where that costs more, from where they do what the addition did.
+    """
     model = with_drive(current.model, drive)
     fitted = timed(polished(model, current.footing, model.space.with_known(current.values), None))
+    back = led_back(current, model) if fitted.objective > current.objective + UNIMPORTANT else None
+    if back is not None:
+        fitted = min(fitted, timed(polished(model, current.footing, back, None)), key=lambda end: end.objective)
     return fitted if fitted.astray and not current.astray else freed(fitted)

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.coordinates import pick, prescribed_motion
-from friction_ocp.drive.mechanism import Mechanism, Motion, column
+from friction_ocp.drive.mechanism import Mechanism, Motion, column, deflection_names
 from friction_ocp.drive.motors import commands, seen_by_controller
 from friction_ocp.drive.parts import Channel, Shaft
 from friction_ocp.drive.torques import applied_torques
@@ -34,6 +34,24 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         ca.SX.zeros(len(mech.looping)),
         column(memory),
     )
+
+
+def unseen_states(mech: Mechanism) -> tuple[int, ...]:
+    """Return the numbers of the states of which `start_state` knows too little to begin there in a motion.
+
+    All but angles, speeds and bristles of shafts that a channel shows: how far a spring is wound up, where in its play
+    a load is and what a controller has summed up hangs on all that was before.
+    """
+    roots, shown = mech.topology.roots, set[str]()
+    for channel in mech.drive.outputs:
+        group = mech.topology.group_of.get(channel.part)
+        if group is not None and channel.signal in ("theta", "omega"):
+            shown |= {f"{roots[group]}.omega", f"{roots[group]}.{channel.signal}"}
+    shown |= {f"{roots[group]}.omega" for group in mech.prescribed}
+    for shaft in mech.bristles:
+        if f"{roots[mech.topology.group_of[shaft.name]]}.omega" in shown:
+            shown.update(deflection_names(shaft))
+    return tuple(k for k, name in enumerate(mech.state_names) if name not in shown)
 
 
 def _deflection(mech: Mechanism, shaft: Shaft, at: Motion, acceleration: dict[int, Any]) -> Any:

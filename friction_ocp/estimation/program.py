@@ -14,6 +14,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from friction_ocp.drive.start import unseen_states
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.normal_equations import NormalEquations
@@ -23,6 +24,9 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yardstick
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 from friction_ocp.simulation.sweep import Sweep
+
+FOLLOWED = 10
+"""Samples after which states are set to what is measured while those that no channel shows are simulated."""
 
 
 @dataclass(frozen=True)
@@ -124,9 +128,31 @@ class Program:
         return sum(int(np.isfinite(item.measured).sum()) for item in self.experiments)
 
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
-        """Return node states from the smoothed measurement."""
+        """Return node states from the smoothed measurement; what it does not show, as it follows from what it does."""
         pairs = zip(self.experiments, self.segments, strict=True)
-        return tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
+        nodes = [self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs]
+        unseen = np.array(unseen_states(self.drive.mechanism), dtype=np.int64)
+        if unseen.size and any(cut.count > 1 for cut in self.segments):
+            for cut, own, followed in zip(self.segments, nodes, self._followed(theta, unseen), strict=True):
+                there = followed[cut.first[1:-1]]
+                own[1:, unseen] = np.where(np.isfinite(there), there, own[1:, unseen])
+        return tuple(nodes)
+
+    def _followed(self, theta: FloatArray, unseen: IntArray) -> list[FloatArray]:
+        """Return by recording (n, unseen) the unseen states, simulated while the others are set to what is measured."""
+        requests = list[SweepRequest]()
+        for item, cut in zip(self.experiments, self.segments, strict=True):
+            often = np.arange(0, int(cut.first[-1]), FOLLOWED, dtype=np.int64)
+            first: IntArray = np.unique(np.concatenate([often, cut.first]))
+            numbers = self.space.numbers(theta, item.name)
+            x0 = self.sweep.start_states(item.signals(first[:-1]), numbers)
+            requests.append(SweepRequest(item.grid, first, x0, numbers, self.width, carried=unseen))
+        found = list[FloatArray]()
+        for request, result in zip(requests, self.sweep.run_many(requests), strict=True):
+            followed = np.full((request.grid.time.size, unseen.size), np.nan)
+            followed[request.first[1:]] = result.end[:, unseen]
+            found.append(followed)
+        return found
 
     def suggested_point(self, theta: FloatArray) -> Point:
         """Return the parameters with the nodes that are suggested for them."""
@@ -142,7 +168,7 @@ class Program:
         value, by_active = many(*(signal.T for signal in item.signals(nodes)), numbers)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
-            return np.asarray(value).T, by_active @ slope
+            return np.array(value).T, by_active @ slope
 
     def measured_starts(self, theta: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return by recording the states (measured, states) of nodes that are no variables, and their derivatives.
