@@ -34,7 +34,7 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
     where most of that stays, steps begin at a large effect, too. Of free runs that miss much steps begin where loosely
-    joined segments lead, too, and so they do at a large effect that no prediction shows.
+    joined segments lead, too, and so they always do at a large effect that no prediction shows.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -47,7 +47,7 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]
     loose = [start.values(item.augmentation.off, base.values, 1.0) for start in item.starts[:1]] if base.lost else []
-    if item.augmentation.outright is not None and base.astray:
+    if item.augmentation.outright is not None:
         loose.append({**base.values, **item.augmentation.outright})
     ends += [timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK) for values in loose]
     large, best = item.augmentation.large, min(end.objective for end in ends)
