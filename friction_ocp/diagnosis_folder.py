@@ -44,7 +44,7 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path, executor: AbstractE
             settings = (model.max_step, source, model.problem.estimation.horizon_s)
             drive = model.problem.drive
             if diagnosis.stated is not None:
-                drive = in_its_loop(drive, diagnosis.stated, diagnosis.problem)
+                drive = in_its_loop(drive, fitted.values, diagnosis.stated, diagnosis.problem)
             text = write_problem(path, drive, fitted.values, target, *settings)
             write_text(target / name, text)
     if following is not None and following.option is not None:

@@ -6,10 +6,12 @@ has nothing to explain then.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
-from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.drive.parts import Channel, Drive, Motor
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.parameters import start_of
 
 
 def driven_as_recorded(problem: Problem) -> Problem | None:
@@ -42,13 +44,30 @@ def opened(stated: Problem, driven: Problem) -> list[str]:
     return [f"{' and '.join(names)}: as recorded, in the place of the controller's command: {what}"]
 
 
-def in_its_loop(drive: Drive, stated: Problem, driven: Problem) -> Drive:
-    """Return a drive with the controller, and the roles of channels, that were stated, where its loop was opened."""
-    if not _is_opened(stated, driven):
+def in_its_loop(drive: Drive, values: Mapping[str, float], stated: Problem, driven: Problem) -> Drive:
+    """Return a drive with the controller, and the roles of channels, that were stated, where its loop was opened.
+
+    `values` are fitted ones. A motor in a loop has no dead time: a controller that is late by it stands for it, and a
+    lag that is longer where the controller knows no instants.
+    """
+    controller = stated.drive.controller
+    if controller is None or not _is_opened(stated, driven):
         return drive
     known = {item.name: item for item in drive.channels}
     channels = tuple(_as_stated(known.get(item.name, item), item) for item in stated.drive.channels)
-    return replace(drive, controller=stated.drive.controller, channels=channels)
+    dead = max((_found(values, item, "dead_time") for item in drive.motors), default=0.0)
+    motors = tuple(replace(item, dead_time=0.0) for item in drive.motors)
+    if controller.sample_time is not None:
+        controller = replace(controller, delay=controller.delay + dead)
+    elif dead > 0:
+        motors = tuple(replace(item, lag=_found(values, item, "lag") + dead) for item in motors)
+    return replace(drive, controller=controller, channels=channels, motors=motors)
+
+
+def _found(values: Mapping[str, float], motor: Motor, name: str) -> float:
+    """Return a number of a motor as it was fitted, or as it is stated."""
+    stated = start_of(getattr(motor, name))
+    return values.get(f"{motor.name}.{name}", float(stated) if isinstance(stated, (int, float)) else 0.0)
 
 
 def _is_opened(stated: Problem, driven: Problem) -> bool:
