@@ -7,7 +7,6 @@ from pathlib import Path
 
 from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import FreeErrors
-from friction_ocp.diagnosis.loop import in_its_loop
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.excitation.next_experiment import follow_up
@@ -42,10 +41,7 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path, executor: AbstractE
         for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
             model, source = fitted.model, diagnosis.problem.text
             settings = (model.max_step, source, model.problem.estimation.horizon_s)
-            drive = model.problem.drive
-            if diagnosis.stated is not None:
-                drive = in_its_loop(drive, fitted.values, diagnosis.stated, diagnosis.problem)
-            text = write_problem(path, drive, fitted.values, target, *settings)
+            text = write_problem(path, model.problem.drive, fitted.values, target, *settings)
             write_text(target / name, text)
     if following is not None and following.option is not None:
         write_recording(following.option.run.recording, target / "next_experiment.h5")

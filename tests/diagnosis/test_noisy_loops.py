@@ -12,10 +12,9 @@ import yaml
 from diagnosis_cases import CURRENT_NOISE, ENCODER_STEP, SECONDS, STEP, axis, diagnosed, write_case
 from plant import Plant, PlantController, PlantSensor, Trajectory, reversing_steps
 
-from friction_ocp.diagnosis.loop import driven_as_recorded, in_its_loop, opened
-from friction_ocp.parameters import Free
+from friction_ocp import simulate
+from friction_ocp.diagnosis.loop import driven_as_recorded, opened
 from friction_ocp.problem_file.load import load_problem
-from friction_ocp.problem_file.write import write_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -66,13 +65,13 @@ def written(folder: Path, unbalance: float = 0.0) -> Path:
 
 
 def test_the_noise_of_a_loop_is_no_gap(tmp_path: Path) -> None:
-    """A model that is right explains the recordings; the file that is written keeps its loop and loads."""
+    """A model that is right explains the recordings; the file that is written is driven as the diagnosis was."""
     result = diagnosed(written(tmp_path))
     assert result["verdict"] == "no_gap"
     assert any(line.startswith("current: as recorded") for line in result["assumptions"])
     base = load_problem(tmp_path / "out" / "base.yaml")
-    assert base.drive.controller is not None
-    assert [item.name for item in base.drive.inputs] == ["wanted"]
+    assert base.drive.controller is None
+    assert [item.name for item in base.drive.inputs] == ["current"]
 
 
 def test_what_a_noisy_loop_hides_is_found(tmp_path: Path) -> None:
@@ -81,6 +80,9 @@ def test_what_a_noisy_loop_hides_is_found(tmp_path: Path) -> None:
     (accepted,) = result["accepted"]
     assert accepted["effect"] == "unbalance"
     assert accepted["parameters"]["motor.gravity.torque"]["value"] == pytest.approx(UNBALANCE, rel=0.1)
+    again = simulate(load_problem(tmp_path / "out" / "augmented.yaml"))
+    for name, (errors, _) in again.validation_errors.items():
+        assert errors.noise_ratio == pytest.approx(result["gap"]["after"][name]["noise_ratio"], rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -98,46 +100,19 @@ def test_a_loop_stays_closed(tmp_path: Path, channel: str, change: dict[str, Any
     assert driven_as_recorded(load_problem(path)) is None
 
 
-def test_a_loop_is_closed_again(tmp_path: Path) -> None:
-    """With the roles that its channels had, and what else was found of them."""
+def test_a_controller_that_differs_by_recording_stays(tmp_path: Path) -> None:
+    """Without it what the file sets of it would be set of nothing."""
+    path = written(tmp_path)
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["recordings"]["train"] = [{"file": "a.h5", "set": {"controller.kp": 0.06}}, "b.h5"]
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    assert driven_as_recorded(load_problem(path)) is None
+
+
+def test_a_loop_that_was_opened_is_told(tmp_path: Path) -> None:
+    """By one sentence."""
     stated = load_problem(written(tmp_path))
     driven = driven_as_recorded(stated)
     assert driven is not None and driven.drive.controller is None
     assert [item.name for item in driven.drive.inputs] == ["current"]
-    found = replace(driven.drive, channels=tuple(replace(item, offset=0.1) for item in driven.drive.channels))
-    closed = in_its_loop(found, {}, stated, driven)
-    assert closed.controller == stated.drive.controller
-    assert [(item.name, item.role) for item in closed.channels] == [(it.name, it.role) for it in stated.drive.channels]
-    assert [item.offset for item in closed.channels] == [0.0, 0.1, 0.1, 0.1]
     assert opened(stated, stated) == [] and len(opened(stated, driven)) == 1
-
-
-def test_a_loop_that_was_not_opened_keeps_how_its_set_points_are_read(tmp_path: Path) -> None:
-    """What another reading of the inputs has found is written as it was found."""
-    stated = load_problem(written(tmp_path))
-    turned = replace(stated.drive, channels=tuple(replace(item, hold="linear") for item in stated.drive.channels))
-    assert in_its_loop(turned, {}, stated, replace(stated, drive=turned)) is turned
-
-
-@pytest.mark.parametrize("sample_time", [STEP, None])
-def test_a_dead_time_in_a_loop_is_written_as_the_loop_has_it(tmp_path: Path, sample_time: float | None) -> None:
-    """The motor of a file with a controller has none: the controller is late, or the motor lags more."""
-    path = written(tmp_path)
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if sample_time is None:
-        del document["controller"]["sample_time"]
-        path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    stated = load_problem(path)
-    driven = driven_as_recorded(stated)
-    assert driven is not None
-    (motor,) = driven.drive.motors
-    late = replace(motor, lag=Free(1e-3, 1e-5, 1.0), dead_time=Free(1e-3, 0.0, 1.0))
-    values = {"motor.lag": 2e-3, "motor.dead_time": 3e-3}
-    closed = in_its_loop(replace(driven.drive, motors=(late,)), values, stated, driven)
-    (motor,), controller = closed.motors, closed.controller
-    assert controller is not None and motor.dead_time == 0.0
-    assert controller.delay == (0.0 if sample_time is None else pytest.approx(3e-3))
-    assert motor.lag == (pytest.approx(5e-3) if sample_time is None else late.lag)
-    again = tmp_path / "again.yaml"
-    again.write_text(write_problem(path, closed, values, tmp_path), encoding="utf-8")
-    assert load_problem(again).drive.controller is not None
