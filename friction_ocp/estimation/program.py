@@ -128,15 +128,20 @@ class Program:
         return sum(int(np.isfinite(item.measured).sum()) for item in self.experiments)
 
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
-        """Return node states from the smoothed measurement; what it does not show, as it follows from what it does."""
+        """Return node states from the smoothed measurement.
+
+        What that does not show is as steady motion has it, or as it follows from what is shown: whichever costs less.
+        """
         pairs = zip(self.experiments, self.segments, strict=True)
-        nodes = [self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs]
+        steady = tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
         unseen = np.array(unseen_states(self.drive.mechanism), dtype=np.int64)
-        if unseen.size and any(cut.count > 1 for cut in self.segments):
-            for cut, own, followed in zip(self.segments, nodes, self._followed(theta, unseen), strict=True):
-                there = followed[cut.first[1:-1]]
-                own[1:, unseen] = np.where(np.isfinite(there), there, own[1:, unseen])
-        return tuple(nodes)
+        if not unseen.size or all(cut.count < 2 for cut in self.segments):
+            return steady
+        nodes = tuple(own.copy() for own in steady)
+        for cut, own, followed in zip(self.segments, nodes, self._followed(theta, unseen), strict=True):
+            there = followed[cut.first[1:-1]]
+            own[1:, unseen] = np.where(np.isfinite(there), there, own[1:, unseen])
+        return min((nodes, steady), key=lambda each: self.objective(Point(theta, each)))
 
     def _followed(self, theta: FloatArray, unseen: IntArray) -> list[FloatArray]:
         """Return by recording (n, unseen) the unseen states, simulated while the others are set to what is measured."""
@@ -168,7 +173,7 @@ class Program:
         value, by_active = many(*(signal.T for signal in item.signals(nodes)), numbers)
         by_active = np.asarray(by_active).reshape(states, len(nodes), active).transpose(1, 0, 2)
         with np.errstate(invalid="ignore"):  # a start state may be undefined; the objective there is infinite
-            return np.array(value).T, by_active @ slope
+            return np.asarray(value).T, by_active @ slope
 
     def measured_starts(self, theta: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return by recording the states (measured, states) of nodes that are no variables, and their derivatives.
