@@ -65,14 +65,13 @@ def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
     """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
     if fitted.footing.segment_s is None:
         return ()
-    places = {probe.component: (probe, stretched(fitted, probe)) for probe in probes(fitted, clues)}
-    by_torque = {
-        name: columns / (SHARE * clues.typical_torque[name])
-        for name, (_, columns) in places.items()
-        if name in clues.typical_torque
-    }
+    places = [(probe, stretched(fitted, probe)) for probe in probes(fitted, clues)]
+    by_torque = dict[str, FloatArray]()
+    for probe, columns in places:  # shafts come first: a channel may have the name of one
+        if probe.component in clues.typical_torque:
+            by_torque.setdefault(probe.component, columns / (SHARE * clues.typical_torque[probe.component]))
     rounding = replace(rounding_of(fitted), inputs=input_columns(fitted, by_torque))
-    return tuple(slow_torque_of(fitted, probe, columns, rounding) for probe, columns in places.values())
+    return tuple(slow_torque_of(fitted, probe, columns, rounding) for probe, columns in places)
 
 
 def significant(found: Sequence[SlowTorque], level: float) -> bool:
