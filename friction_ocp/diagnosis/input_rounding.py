@@ -15,9 +15,8 @@ import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import input_noise, torque_factor
 from friction_ocp.diagnosis.linear import LinearRecording
-from friction_ocp.diagnosis.rounding import wave_powers
+from friction_ocp.diagnosis.rounding import step_of, wave_powers
 from friction_ocp.drive.parts import Channel
-from friction_ocp.recording.conditioning import detect_resolution
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 linalg: Any = _linalg  # its own types are incomplete
@@ -51,11 +50,8 @@ def stretch_of(item: LinearRecording) -> IntArray:
 
 
 def _step(fitted: FittedModel, channel: Channel) -> float | None:
-    """Return the step of an input, as stated or as its values show it."""
-    if channel.resolution is not None:
-        return channel.resolution
     values = [use.recording.channels[channel.name].values for use in fitted.model.problem.recordings]
-    return detect_resolution(np.concatenate(values))
+    return step_of(channel, np.concatenate(values))
 
 
 def _mean_errors(fitted: FittedModel, channel: Channel, step: float) -> FloatArray:

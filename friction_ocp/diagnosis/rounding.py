@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import LinearRecording
+from friction_ocp.drive.parts import Channel
 from friction_ocp.recording.conditioning import detect_resolution
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
@@ -91,16 +92,15 @@ def rounding_of(fitted: FittedModel) -> Rounding:
             long = _is_stay(values)[number]
             stays[own[long]] = count + number[long]
             count += int(own.size)
-            step = _step(fitted, channel, values)
+            step = step_of(fitted.model.problem.drive.outputs[channel], values)
             if step is not None:
                 counters.append(_counter(item, channel, step, own[~long], rows.node[own[~long]]))
     return Rounding(stays, tuple(counters))
 
 
-def _step(fitted: FittedModel, channel: int, values: FloatArray) -> float | None:
+def step_of(channel: Channel, values: FloatArray) -> float | None:
     """Return the step of a channel, as stated or as its values show it."""
-    stated = fitted.model.problem.drive.outputs[channel].resolution
-    return detect_resolution(values) if stated is None else stated
+    return detect_resolution(values) if channel.resolution is None else channel.resolution
 
 
 def _counter(item: LinearRecording, channel: int, step: float, rows: IntArray, nodes: IntArray) -> Counter:

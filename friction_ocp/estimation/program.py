@@ -135,7 +135,7 @@ class Program:
         pairs = zip(self.experiments, self.segments, strict=True)
         steady = tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
         unseen = np.array(unseen_states(self.drive.mechanism), dtype=np.int64)
-        if not unseen.size or all(cut.count < 2 for cut in self.segments):
+        if not unseen.size or self.without_nodes or all(cut.count < 2 for cut in self.segments):
             return steady
         nodes = tuple(own.copy() for own in steady)
         for cut, own, followed in zip(self.segments, nodes, self._followed(theta, unseen), strict=True):
