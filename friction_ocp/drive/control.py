@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -66,6 +66,20 @@ def integral_rate(controller: Controller, seen: ControlSignals, integral: Any) -
     raw = command(controller, seen, integral)
     outward = (raw - saturate(controller, raw)) * rate > 0
     return where(outward, 0.0 * rate, rate)
+
+
+def noise_gain(controller: Controller, measures_speed: bool, step: float) -> float:
+    """Return the white noise of the command over that of what a controller sees, samples `step` s apart.
+
+    The controller is one of plain numbers; its integral, which is slow, and its saturation are left out.
+    """
+    names = ("theta", "omega", "controller.previous1", "controller.previous2")
+    noisy = {name: ca.SX.sym(name) for name in names}
+    ticking = replace(controller, sample_time=controller.sample_time or step)
+    seen = ControlSignals(0.0, 0.0, noisy["theta"], noisy["omega"], measures_speed)
+    wanted = command(ticking, seen_by_sampled(ticking, seen, noisy), 0.0)
+    slopes = ca.jacobian(ca.SX(wanted), ca.vertcat(*noisy.values()))
+    return float(ca.evalf(ca.norm_2(slopes.T)))
 
 
 def memory_names(controller: Controller) -> tuple[str, ...]:

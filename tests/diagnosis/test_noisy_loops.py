@@ -14,6 +14,8 @@ from plant import Plant, PlantController, PlantSensor, Trajectory, reversing_ste
 
 from friction_ocp import simulate
 from friction_ocp.diagnosis.loop import driven_as_recorded, opened
+from friction_ocp.drive.control import noise_gain
+from friction_ocp.drive.parts import Controller
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
@@ -30,19 +32,23 @@ CHANNELS: dict[str, dict[str, Any]] = {
 }
 
 
-def looped(unbalance: float) -> Plant:
-    """Return the axis under a speed loop that sees its tachometer with the noise that is logged."""
+def looped(unbalance: float, feedback: str) -> Plant:
+    """Return the axis under a speed loop that sees its tachometer with the noise that is logged, or without any."""
     plain = axis()
     return replace(
         plain,
         shafts=(replace(plain.shafts[0], gravity=(unbalance, 0.3)),),
         motors=(replace(plain.motors[0], controller="loop"),),
-        controllers=(PlantController("loop", "pi_velocity", "speed", **GAINS),),
-        sensors=(*plain.sensors, PlantSensor("speed", "motor.omega", period=STEP, noise_std=TACHO_NOISE)),
+        controllers=(PlantController("loop", "pi_velocity", feedback, **GAINS),),
+        sensors=(
+            *plain.sensors,
+            PlantSensor("speed", "motor.omega", period=STEP, noise_std=TACHO_NOISE),
+            PlantSensor("quiet", "motor.omega", period=STEP),
+        ),
     )
 
 
-def written(folder: Path, unbalance: float = 0.0) -> Path:
+def written(folder: Path, unbalance: float = 0.0, feedback: str = "speed") -> Path:
     """Write three recordings and a problem whose model is right but for the unbalance."""
     path, time = (
         write_case(folder, axis(), effects=["unbalance", "stribeck", "sensor_delay"]),
@@ -52,7 +58,7 @@ def written(folder: Path, unbalance: float = 0.0) -> Path:
         rng = np.random.default_rng(20 + k)
         steps = reversing_steps(np.array([2.0, 6.0, 15.0]), (0.2, 0.6), SECONDS, rng)
         wanted = np.interp(time, np.asarray(steps.time), np.asarray(steps.value))
-        run = looped(unbalance).simulate(SECONDS, {"reference.omega": Trajectory(time, wanted, "zero")}, rng)
+        run = looped(unbalance, feedback).simulate(SECONDS, {"reference.omega": Trajectory(time, wanted, "zero")}, rng)
         found = {key: Channel(key, *run.channels[key], UNITS[key]) for key in UNITS if key in run.channels}
         seen = found["position"].time
         found["wanted"] = Channel("wanted", seen, np.append(wanted, wanted[-1])[: seen.size], "rad/s")
@@ -98,6 +104,21 @@ def test_a_loop_stays_closed(tmp_path: Path, channel: str, change: dict[str, Any
     document["channels"][channel] = {key: value for key, value in spoilt.items() if value is not None}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     assert driven_as_recorded(load_problem(path)) is None
+
+
+def test_a_loop_that_sees_finer_than_what_is_logged_stays_closed(tmp_path: Path) -> None:
+    """Its command, less noisy than the loop would make it of what is logged, tells."""
+    assert driven_as_recorded(load_problem(written(tmp_path, feedback="quiet"))) is None
+
+
+@pytest.mark.parametrize("step", [None, STEP])
+def test_noise_of_a_command(step: float | None) -> None:
+    """That of an angle counts twice where it is differentiated, that of a speed once."""
+    gains = Controller("pd", "position", kp=3.0, kd=0.01, sample_time=step)
+    assert noise_gain(gains, False, STEP) == pytest.approx(np.hypot(3.0 + 0.01 / STEP, 0.01 / STEP))
+    inner = Controller("cascade", "position", kp=20.0, ki=5.0, kd=0.1, sample_time=step, derivative="two_tap_mean")
+    assert noise_gain(inner, False, STEP) == pytest.approx(0.1 * np.hypot(20.0 + 0.5 / STEP, 0.5 / STEP))
+    assert noise_gain(Controller("pi_velocity", "speed", kp=0.06, ki=0.6, sample_time=step), True, STEP) == 0.06
 
 
 def test_a_controller_that_differs_by_recording_stays(tmp_path: Path) -> None:
