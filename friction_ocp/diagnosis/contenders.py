@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
@@ -37,7 +39,7 @@ def to_refit(
     What may be large and yet promises nothing is tried wherever a model has gone astray.
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
-    joined segments do, where both are judged by squares.
+    joined segments do, where both are judged by squares and the best is no work of chance.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if not chosen or not current.astray:
@@ -47,7 +49,9 @@ def to_refit(
         first = [item for item in chosen if item.starts][:BEGUN]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
         tried = _and(tried, outright)
-        return _leading(tried, crew.fitted_loosely(tried)) if current.leads_loosely else tried, []
+        if not current.leads_loosely:
+            return tried, []
+        return _leading(tried, crew.fitted_loosely(tried), samples(current)), []
     unfitted = _promising(crew.screened_unfitted(keys))
     return _and(with_resembling(chosen, found, astray=True), outright), _and(unfitted, outright)
 
@@ -58,8 +62,15 @@ def _and(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screene
     return [*chosen, *(item for item in others if item.key not in keys)]
 
 
-def _leading(tried: Sequence[Screened], gains: Sequence[float]) -> list[Screened]:
-    """Return candidates that gain a notable share of the most where segments are loosely joined, two at least."""
+def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> list[Screened]:
+    """Return candidates that gain a notable share of the most where segments are loosely joined, two at least.
+
+    All, where none is worth its parameters there by BIC over `count` samples: what moves free runs over minutes can be
+    hidden in short segments, and what is gained there is chance.
+    """
+    worth = [gain > 0.5 * len(item.augmentation.off) * np.log(count) for item, gain in zip(tried, gains, strict=True)]
+    if not any(worth):
+        return list(tried)
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     enough = MOST_ALIKE * gains[order[0]]
     return [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
