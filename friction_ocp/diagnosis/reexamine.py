@@ -15,9 +15,11 @@ from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds, held_out
-from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished
+from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.led_back import led_back
+from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished, timed
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.refit import completed, without_addition
+from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Choice, Round, choose, gave_shape, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import OF_ALL, Key, may_grow, required, samples
@@ -30,6 +32,22 @@ from friction_ocp.statistics.execution import Execution
 
 TRIED = 2
 """Rivals of an earlier addition, best first, that are tried in its place."""
+
+
+def gone_back(bench: Bench, extended: FittedModel, first: bool) -> Bench | None:
+    """Return the bench of a better fit of the current model where it does what an addition did; None where it does not.
+
+    Then the addition was no more than a way out of where the fit had been caught. The `first` one led the base model.
+    """
+    known = bench.current
+    back = led_back(extended, known.model)
+    if back is None:
+        return None
+    found = freed(timed(polished(known.model, known.footing, back, None)))
+    if known.objective - found.objective < MOST_OF * (known.objective - extended.objective):
+        return None
+    moved = bench.at(found)
+    return replace(moved, base_point=moved.seat.point) if first else moved
 
 
 def without_superfluous(

@@ -20,7 +20,7 @@ from friction_ocp.diagnosis.left_out import left_out_before_and_after
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.reexamine import exchanged, without_small, without_superfluous
+from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
@@ -102,6 +102,10 @@ class Search:
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
             if not self.rounds and self._seems_missing(done) and self._better_base():
+                done = self._round(self.bench, self.accepted, self.meant)
+            back = None if done.accepted is None else gone_back(self.bench, done.accepted.fitted, not self.accepted)
+            if back is not None:
+                self.bench = back
                 done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
                 done = self._elsewhere() or done
