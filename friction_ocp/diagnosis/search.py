@@ -42,7 +42,7 @@ from friction_ocp.statistics.execution import Execution
 MOST_ROUNDS = 4
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MOST_STEPS, MOST_RUNS = 0.9e9, 1750.0
+MOST_STEPS, MOST_RUNS = 1.5e9, 2900.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
 PART = 0.25
