@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
-from friction_ocp.drive.parts import Channel, Motor
+from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.estimation.experiment import COLUMNS, Experiment
 from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
@@ -150,26 +150,22 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
     options = model.problem.estimation
     stated = options.process_noise.keys() - set(options.estimated_noise)
     power = {shaft: options.process_noise[shaft] ** 2 for shaft in sorted(stated)}
-    for motor in model.problem.drive.motors:
-        for channel in model.problem.drive.inputs:
-            factor = torque_factor(motor, channel, numbers)
-            if factor is None:
-                continue
-            std, step = input_noise(model, channel)
-            power[motor.shaft] = power.get(motor.shaft, 0.0) + (factor * std) ** 2 * step
+    for shaft, channel, factor in driving(model.problem.drive, numbers):
+        std, step = input_noise(model, channel)
+        power[shaft] = power.get(shaft, 0.0) + (factor * std) ** 2 * step
     return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
 
 
-def torque_factor(motor: Motor, channel: Channel, numbers: Mapping[str, float]) -> float | None:
-    """Return the torque of a motor per unit that an input channel shows; None where the channel does not drive it.
-
-    What a channel with a gain shows is that much more than what drives the motor.
-    """
-    constant = numbers.get(f"{motor.name}.torque_constant", 1.0)
-    factors = {"torque": 1.0, "current": constant, "current_command": constant}
-    factors["voltage"] = constant / max(numbers.get(f"{motor.name}.resistance", 1.0), 1e-300)
-    factor = factors.get(channel.signal) if channel.part == motor.name else None
-    return None if factor is None else factor / (numbers.get(f"{channel.name}.gain", 1.0) or 1.0)
+def driving(drive: Drive, numbers: Mapping[str, float]) -> Iterator[tuple[str, Channel, float]]:
+    """Yield the shaft that a motor turns, an input channel that drives this motor, and the torque per unit shown."""
+    for motor in drive.motors:
+        constant = numbers.get(f"{motor.name}.torque_constant", 1.0)
+        factors = {"torque": 1.0, "current": constant, "current_command": constant}
+        factors["voltage"] = constant / max(numbers.get(f"{motor.name}.resistance", 1.0), 1e-300)
+        for channel in drive.inputs:
+            if channel.part == motor.name and channel.signal in factors:
+                gain = numbers.get(f"{channel.name}.gain", 1.0) or 1.0
+                yield motor.shaft, channel, factors[channel.signal] / gain
 
 
 def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
@@ -265,20 +261,17 @@ def input_impulses(model: Model, item: Experiment, numbers: Mapping[str, float])
     A jump at an unknown instant between two samples that are joined by a line leaves its size times the interval
     over sqrt(12); what bends less than noise would bend counts as smooth.
     """
-    drive = model.problem.drive
     found: dict[str, FloatArray] = {}
-    for motor in drive.motors:
-        for channel in drive.inputs:
-            factor = torque_factor(motor, channel, numbers)
-            if factor is None or channel.hold == "zero":
-                continue
-            column = model.drive.input_names.index(channel.name)
-            bend = np.abs(np.diff(item.grid.at_node[:, column], 2, prepend=np.nan, append=np.nan))
-            std, _ = input_noise(model, channel)
-            jump = np.fmax(bend, np.append(bend[1:], np.nan))
-            jump = np.where(jump > SMOOTH * std, np.nan_to_num(jump), 0.0)
-            impulse = factor * jump * item.grid.dt / np.sqrt(12.0)
-            found[motor.shaft] = np.hypot(found.get(motor.shaft, 0.0), impulse)
+    for shaft, channel, factor in driving(model.problem.drive, numbers):
+        if channel.hold == "zero":
+            continue
+        column = model.drive.input_names.index(channel.name)
+        bend = np.abs(np.diff(item.grid.at_node[:, column], 2, prepend=np.nan, append=np.nan))
+        std, _ = input_noise(model, channel)
+        jump = np.fmax(bend, np.append(bend[1:], np.nan))
+        jump = np.where(jump > SMOOTH * std, np.nan_to_num(jump), 0.0)
+        impulse = factor * jump * item.grid.dt / np.sqrt(12.0)
+        found[shaft] = np.hypot(found.get(shaft, 0.0), impulse)
     return found
 
 

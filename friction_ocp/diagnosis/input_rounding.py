@@ -13,7 +13,7 @@ import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import input_noise, torque_factor
+from friction_ocp.diagnosis.footing import driving, input_noise
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.diagnosis.rounding import step_of, wave_powers
 from friction_ocp.drive.parts import Channel
@@ -36,11 +36,10 @@ def input_columns(fitted: FittedModel, by_torque: Mapping[str, FloatArray]) -> F
     """
     model, found = fitted.model, [np.zeros((fitted.linear.rows.residual.size, 0))]
     numbers = fitted.footing.numbers[model.train[0].name]
-    for motor in model.problem.drive.motors:
-        for channel in model.problem.drive.inputs:
-            factor, step = torque_factor(motor, channel, numbers), _step(fitted, channel)
-            if factor is not None and step is not None and motor.shaft in by_torque:
-                found.append(factor * by_torque[motor.shaft] @ _mean_errors(fitted, channel, step))
+    for shaft, channel, factor in driving(model.problem.drive, numbers):
+        step = _step(fitted, channel)
+        if step is not None and shaft in by_torque:
+            found.append(factor * by_torque[shaft] @ _mean_errors(fitted, channel, step))
     return np.concatenate(found, axis=1)
 
 
