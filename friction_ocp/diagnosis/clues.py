@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import group_inertias, speed_ratio
+from friction_ocp.diagnosis.footing import group_inertias
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
@@ -20,6 +20,7 @@ from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
+from friction_ocp.estimation.torque_noise import speed_ratio
 from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
@@ -51,7 +52,7 @@ def _clues_of(fitted: FittedModel) -> Clues:
     by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
     typical = _typical_torques(fitted, tables, by_path)
     free = fitted.footing.segment_s is None
-    segment = fitted.model.problem.estimation.segment
+    segment = fitted.model.problem.estimation.samples
     coarse = _smoothers(fitted, segment, typical) if free else fitted.linear.recordings
     longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
     finely = _smoothers(fitted, max(FINE, longest // MOST_FINE), typical)
@@ -132,7 +133,7 @@ def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
         if group in mech.free_groups and middle.size:
             at = len(mech.angle_groups) + mech.free_groups.index(group)
             jump = smoother.nodes[1:, at] - smoother.end[:-1, at]
-            ratio = speed_ratio(fitted.model, fitted.footing, name, shaft.name)
+            ratio = speed_ratio(mech, fitted.footing.numbers[name], shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
         missing[shaft.name] = torque
     return Missing(middle, missing)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
-from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import COLUMNS, Experiment
 from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
@@ -20,6 +20,7 @@ from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program, Segments
 from friction_ocp.estimation.stages import windows
+from friction_ocp.estimation.torque_noise import driving, speed_ratio
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
@@ -156,18 +157,6 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
     return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
 
 
-def driving(drive: Drive, numbers: Mapping[str, float]) -> Iterator[tuple[str, Channel, float]]:
-    """Yield the shaft that a motor turns, an input channel that drives this motor, and the torque per unit shown."""
-    for motor in drive.motors:
-        constant = numbers.get(f"{motor.name}.torque_constant", 1.0)
-        factors = {"torque": 1.0, "current": constant, "current_command": constant}
-        factors["voltage"] = constant / max(numbers.get(f"{motor.name}.resistance", 1.0), 1e-300)
-        for channel in drive.inputs:
-            if channel.part == motor.name and channel.signal in factors:
-                gain = numbers.get(f"{channel.name}.gain", 1.0) or 1.0
-                yield motor.shaft, channel, factors[channel.signal] / gain
-
-
 def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
     """Return the noise floor of an input and its sampling interval."""
     signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
@@ -182,16 +171,6 @@ def group_inertias(mech: Mechanism, numbers: Mapping[str, float]) -> FloatArray:
     inertias = ca.vertcat(*[ca.SX(mech.inertia(g)) for g in range(len(mech.topology.roots))])
     function = ca.Function("inertia", list(mech.parameters.values()), [inertias])
     return np.asarray(function(*(numbers.get(name, 1.0) for name in mech.parameters))).ravel()
-
-
-def speed_ratio(model: Model, foot: Footing, recording: str, shaft: str) -> float:
-    """Return the speed of a shaft over that of its group's first shaft."""
-    ratio = model.drive.mechanism.topology.speed_ratio[shaft]
-    if not isinstance(ratio, ca.SX):
-        return float(ratio)
-    mech, numbers = model.drive.mechanism, foot.numbers[recording]
-    function = ca.Function("ratio", list(mech.parameters.values()), [ratio])
-    return float(function(*(numbers.get(name, 1.0) for name in mech.parameters)))
 
 
 def group_density(model: Model, foot: Footing, recording: str) -> FloatArray:
@@ -239,7 +218,7 @@ def _jump_power(
     power = np.zeros((len(inertias), spans.size))
     for shaft, values in impulses.items():
         group = mech.topology.group_of[shaft]
-        ratio = speed_ratio(model, foot, item.name, shaft) / max(float(inertias[group]), 1e-300)
+        ratio = speed_ratio(mech, foot.numbers[item.name], shaft) / max(float(inertias[group]), 1e-300)
         power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
     return power
 
@@ -290,7 +269,7 @@ def still_gaps(model: Model, foot: Footing, recording: str, span: float) -> Floa
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal not in ("theta", "omega"):
             continue
-        ratio = abs(speed_ratio(model, foot, recording, channel.part))
+        ratio = abs(speed_ratio(mech, foot.numbers[recording], channel.part))
         floor = NEGLIGIBLE_GAP * float(model.noise[k]) / max(ratio, 1e-300)
         names = {f"{mech.topology.roots[group]}.theta": floor, f"{mech.topology.roots[group]}.omega": floor / span}
         for state, limit in names.items():
@@ -331,6 +310,6 @@ def within(model: Model, foot: Footing, item: Experiment, seconds: float) -> Flo
         name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
         if name in model.drive.state_names:
             at = model.drive.state_names.index(name)
-            ratio = speed_ratio(model, foot, item.name, channel.part)
+            ratio = speed_ratio(mech, foot.numbers[item.name], channel.part)
             added[k] = ratio**2 * float(np.mean(covariances[:, at, at]))
     return added

@@ -13,10 +13,11 @@ import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import driving, input_noise
+from friction_ocp.diagnosis.footing import input_noise
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.diagnosis.rounding import step_of, wave_powers
 from friction_ocp.drive.parts import Channel
+from friction_ocp.estimation.torque_noise import driving
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 linalg: Any = _linalg  # its own types are incomplete

@@ -48,7 +48,7 @@ def divided_afresh(model: Model, program: Program, point: Point) -> tuple[Progra
 def is_divided(model: Model, program: Program) -> bool:
     """Whether relaxed segments were cut further than they were to begin with."""
     pairs = zip(program.experiments, program.segments, strict=True)
-    return any(not np.array_equal(cut.first, cuts(item, model.problem.estimation.segment)) for item, cut in pairs)
+    return any(not np.array_equal(cut.first, cuts(item, model.problem.estimation.samples)) for item, cut in pairs)
 
 
 def reweighed(model: Model, program: Program) -> Program:

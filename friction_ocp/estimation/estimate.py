@@ -16,7 +16,7 @@ from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, beyond_the_log, named_in_trades, verdicts
 from friction_ocp.estimation.influence import influence
-from friction_ocp.estimation.model import Model, prepare, prepare_fit
+from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.progress import Progress, Report, silent
@@ -24,6 +24,7 @@ from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.sampling_limit import beyond_sampling
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
+from friction_ocp.estimation.torque_noise import prepare_identification
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, whiteness
@@ -117,7 +118,7 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     iterate, on Ctrl-C. A fit that did not converge is returned with `converged` False and says why in `message`.
     """
     began = time.perf_counter()
-    model = prepare_fit(problem)
+    model = prepare_identification(problem)
     built = time.perf_counter()
     reports: list[Report] = []
 

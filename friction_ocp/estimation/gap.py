@@ -25,7 +25,7 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     durations = np.diff(item.grid.time[first])[:-1]
     if not model.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
-    shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.segment)
+    shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)
 

@@ -215,7 +215,7 @@ def starting_level(model: Model, shaft: str) -> float:
     item = model.train[0]
     numbers = model.space.numbers(model.nominal, item.name)
     per_unit = acceleration_noise(mech, {shaft: 1.0}, numbers)[group]
-    span = float(np.mean(np.diff(item.grid.time[cuts(item, model.problem.estimation.segment)])))
+    span = float(np.mean(np.diff(item.grid.time[cuts(item, model.problem.estimation.samples)])))
     column = len(mech.angle_groups) + list(mech.free_groups).index(group)
     return float(RELATIVE_GAP * model.state_scale[column] / (per_unit * np.sqrt(span)))
 

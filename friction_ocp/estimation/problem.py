@@ -55,6 +55,10 @@ class StaticUse:
         return self.points.name
 
 
+SEGMENT = 50
+"""Samples in a segment of the relaxed problem, usually."""
+
+
 @dataclass(frozen=True)
 class EstimationOptions:
     """How the fit is made; the defaults need no expert."""
@@ -63,8 +67,9 @@ class EstimationOptions:
     fit: Fit | None = None
     """`simulation` fits the free run over the whole recording, `relaxed` short segments joined by process noise;
     None chooses: relaxed where a drive without feedback drifts under its measured input."""
-    segment: int = 50
-    """Samples in a segment of the relaxed problem."""
+    segment: int | None = None
+    """Samples in a segment of the relaxed problem; None is SEGMENT, or fewer where torque noise moves a channel
+    within."""
     process_noise: Mapping[str, float] = field(default_factory=dict[str, float])
     """Torque noise by shaft, N m/sqrt(Hz)."""
     estimated_noise: tuple[str, ...] = ()
@@ -77,6 +82,11 @@ class EstimationOptions:
     max_iterations: int = 100
     max_step: float | None = None
     """Longest integrator step, s; None chooses it from the fastest mode of the drive."""
+
+    @property
+    def samples(self) -> int:
+        """Samples in a segment of the relaxed problem."""
+        return self.segment or SEGMENT
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def predictions(model: Model, experiments: Experiments, width: float) -> Program
 
 def relaxed(model: Model, experiments: Experiments, width: float, loss: AbstractLoss) -> Program:
     """Return segments joined by process noise."""
-    pieces = [(item, cuts(item, model.problem.estimation.segment)) for item in experiments]
+    pieces = [(item, cuts(item, model.problem.estimation.samples)) for item in experiments]
     segments = tuple(segments_at(model, item, first) for item, first in pieces)
     return program_of(model, experiments, segments, width, loss)
 
@@ -81,7 +81,7 @@ def along_measurement(model: Model, width: float) -> Program:
     """
     segments: list[Segments] = []
     for item in model.train:
-        first = cuts(item, model.problem.estimation.segment)
+        first = cuts(item, model.problem.estimation.samples)
         weight = gap_weights(model, item, first)
         if fits_free_run(model):
             weight = np.tile(np.diag(1.0 / (NO_GAP * model.state_scale)), (len(first) - 2, 1, 1))

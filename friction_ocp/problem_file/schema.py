@@ -245,7 +245,7 @@ class RecordingsSection(Section):
 class EstimationSection(Section):
     solver: Solver = "gauss_newton"
     fit: Fit | None = None
-    segment: Annotated[int, Field(ge=1)] = 50
+    segment: Annotated[int, Field(ge=1)] | None = None
     process_noise: dict[str, NoiseNumber] = Field(default_factory=dict[str, Any])
     loss: Loss = "squares"
     horizon_s: Positive | None = None

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from friction_ocp.estimation.model import Model, prepare_fit
+from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.rounds import Fitted
+from friction_ocp.estimation.torque_noise import prepare_identification
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.statistics.optimum import Optimum
 
@@ -23,7 +24,7 @@ class Workshop:
     @cached_property
     def model(self) -> Model:
         """The problem made ready to compute, with what was settled at the optimum."""
-        model = prepare_fit(self.problem)
+        model = prepare_identification(self.problem)
         return model if self.optimum is None else self.optimum.settled(model)
 
     @cached_property
