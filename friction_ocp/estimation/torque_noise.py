@@ -33,7 +33,7 @@ def prepare_identification(problem: Problem) -> Model:
     """
     model = prepare_fit(problem)
     options = problem.estimation
-    if fits_free_run(model) or options.estimated_noise:
+    if not model.train or fits_free_run(model) or options.estimated_noise:
         return model
     model = _with_options(model, process_noise=dict(options.process_noise) or stated_input_noise(model))
     return model if options.segment or not model.process_noise else _with_options(model, segment=_longest(model))
@@ -62,7 +62,7 @@ def speed_ratio(mech: Mechanism, numbers: Mapping[str, float], shaft: str) -> fl
 
 def stated_input_noise(model: Model) -> dict[str, float]:
     """Return by shaft the torque noise, N m/sqrt(Hz), that the `noise_std` of measured inputs makes at the guesses."""
-    first = model.problem.recordings[0]
+    first = model.problem.train[0]
     values = model.space.numbers(model.nominal, first.name)
     numbers = dict(zip(model.space.leaf_names, map(float, values), strict=True))
     power: dict[str, float] = {}
