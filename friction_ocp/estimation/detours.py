@@ -12,6 +12,7 @@ from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gau
 from friction_ocp.estimation.growth import joined_at_no_cost
 from friction_ocp.estimation.horizon import longest_recording
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rounds import COARSE, FINE, Fitted, final_solver, is_same_end, limits, windowed
@@ -21,6 +22,8 @@ from friction_ocp.simulation.losses import Absolute, Squares
 
 DETOURS = (0.05, 0.01, 0.0025)
 """Smoothing of the sign over the typical speed on the way around a kink of exact friction."""
+RESTARTS = 4
+"""Most detours, one from each of the start states that were found."""
 WINDOWS = 8
 """Windows of each free run on the way around an end that only a run over all of it has."""
 HOPS = (0.005, 0.02, 0.05)
@@ -48,6 +51,32 @@ KEPT = Persistence(3, 24, Tolerances(decrease=1e-6, progress=1e-5))
 def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     """Leave an end that exact friction makes: through the same program with a smoothed sign, and back.
 
+    And again from other start states where these, as they are measured, fit better: a bristle or a spring that begins
+    on its other side bends a run for long, and leads the parameters astray.
+    """
+    for _ in range(RESTARTS):
+        fitted = _around(model, fitted, phases)
+        point = _restarted(fitted)
+        if point is None:
+            break
+        watch = phases.begin("from the measured start")
+        end = final_solver(model)(fitted.program, point, limits(model), watch)
+        fitted = replace(fitted, solution=replace(end, iterations=end.iterations + fitted.solution.iterations))
+    return rejoined(model, fitted, phases)
+
+
+def _restarted(fitted: Fitted) -> Point | None:
+    """Return the parameters with the measured start states solved for again; None where that is no better."""
+    program, best = fitted.program, fitted.solution
+    if program.without_nodes or not isinstance(program.loss, Squares):
+        return None
+    point = solve_nodes(program, program.suggested_point(best.point.theta))
+    return point if program.objective(point) < (1.0 - BETTER) * best.objective else None
+
+
+def _around(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
+    """Go around a kink.
+
     Between two kinks there may be an end that is smooth by itself, and near the best one: one detour is always made.
     """
     program, best = fitted.program, fitted.solution
@@ -60,7 +89,7 @@ def detour(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         end = final_solver(model)(program, between.point, limits(model), watch)
         iterations = best.iterations + between.iterations + end.iterations
         best = replace(min(best, end, key=lambda solution: solution.objective), iterations=iterations)
-    return rejoined(model, replace(fitted, solution=best), phases)
+    return replace(fitted, solution=best)
 
 
 def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
