@@ -50,7 +50,7 @@ def driven_as_recorded(problem: Problem) -> Problem | None:
 
 def _sees_finer(problem: Problem, controller: Controller, feedback: Channel, shown: Channel) -> bool:
     """Whether a recorded command is too quiet for a loop that acts on the noise of its feedback as logged."""
-    if controller.type == "duty" or feedback.noise_std is None:
+    if controller.type == "duty" or feedback.noise_std is None or not problem.recordings:
         return False
     signals = _signals(problem, shown)
     step = float(np.median([np.median(np.diff(item.time)) for item in _signals(problem, feedback)]))
