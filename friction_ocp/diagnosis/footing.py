@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from itertools import pairwise
 
 import casadi as ca
@@ -18,21 +19,25 @@ from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.horizon import is_held
 from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.noise import noise_floor
-from friction_ocp.estimation.program import Program, Segments
+from friction_ocp.estimation.program import Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.estimation.stages import windows
-from friction_ocp.estimation.torque_noise import driving, speed_ratio
+from friction_ocp.estimation.torque_noise import (
+    MOST_SEGMENTS,
+    QUARTERS,
+    SHORTEST,
+    driving,
+    input_power,
+    seen_variance,
+    speed_ratio,
+)
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
-SHORTEST, LONGEST = 2, 50
-"""Samples in a segment."""
-MOST_SEGMENTS, MOST_CUTS = 3000, 200
-"""In one recording, and intervals of doubtful torque that are cut out; more cost time. Fewer segments blur what torque
-noise gathers within each."""
-QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
-"""Shares of a segment at which what gathers within it is looked at."""
+LONGEST, MOST_CUTS = 50, 200
+"""Samples in a segment, and intervals of doubtful torque in one recording that are cut out; more cost time."""
 WITHIN = 0.01
 """Variance that torque noise may add within a segment over that of a channel. What it does there counts as noise of the
 channel, and again in the gap behind: with as much as the channel's own, slow torques look twice as certain as they
@@ -151,9 +156,8 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
     options = model.problem.estimation
     stated = options.process_noise.keys() - set(options.estimated_noise)
     power = {shaft: options.process_noise[shaft] ** 2 for shaft in sorted(stated)}
-    for shaft, channel, factor in driving(model.problem.drive, numbers):
-        std, step = input_noise(model, channel)
-        power[shaft] = power.get(shaft, 0.0) + (factor * std) ** 2 * step
+    for shaft, value in input_power(model.problem.drive, numbers, partial(input_noise, model)).items():
+        power[shaft] = power.get(shaft, 0.0) + value
     return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
 
 
@@ -300,16 +304,7 @@ def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray
 
 def within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
     """Return (outputs,) the mean variance that torque noise adds from a known start on, over some seconds."""
-    mech = model.drive.mechanism
     numbers, motion = _leaf_numbers(model, foot, item.name), _typical_motion(model, foot, item)
     units = unit_covariances(model, numbers, seconds * QUARTERS, motion)
     covariances: FloatArray = np.einsum("g,gsij->sij", group_density(model, foot, item.name) ** 2, units)
-    added = np.zeros(len(mech.drive.outputs))
-    for k, channel in enumerate(mech.drive.outputs):
-        group = mech.topology.group_of.get(channel.part)
-        name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
-        if name in model.drive.state_names:
-            at = model.drive.state_names.index(name)
-            ratio = speed_ratio(mech, foot.numbers[item.name], channel.part)
-            added[k] = ratio**2 * float(np.mean(covariances[:, at, at]))
-    return added
+    return seen_variance(model.drive.mechanism, foot.numbers[item.name], covariances)

@@ -14,7 +14,8 @@ import numpy as np
 from friction_ocp.diagnosis.footing import Footing, gap_roots, input_impulses, torque_noise
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.program import Program, Segments
+from friction_ocp.estimation.program import Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.simulation.grid import FloatArray
 
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.estimation.stages import cuts, relaxed, segments_at
 from friction_ocp.simulation.grid import FloatArray, IntArray
 

@@ -19,6 +19,7 @@ from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.normal_equations import NormalEquations
 from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yardstick
@@ -27,43 +28,6 @@ from friction_ocp.simulation.sweep import Sweep
 
 FOLLOWED = 10
 """Samples after which states are set to what is measured while those that no channel shows are simulated."""
-
-
-@dataclass(frozen=True)
-class Segments:
-    """How one recording is cut."""
-
-    first: IntArray
-    """(segments + 1,) first node of each segment; last the last node of the recording."""
-    gap_weight: FloatArray | None
-    """(segments - 1, states, states) W with W'W the inverse covariance of each continuity gap; None leaves
-    the segments unconnected (windows)."""
-    measured: int = 0
-    """How many nodes, from the first, are no variables but what the smoothed measurement says."""
-    start_weight: FloatArray | None = None
-    """(segments, states) 1 / standard deviation of the prior on each node, about what the smoothed measurement says."""
-
-    @property
-    def count(self) -> int:
-        """Number of segments."""
-        return len(self.first) - 1
-
-    def owner(self, nodes: IntArray) -> IntArray:
-        """Return the index of the segment that each grid node belongs to; the closing node to the last one."""
-        return np.clip(np.searchsorted(self.first, nodes, side="right") - 1, 0, self.count - 1)
-
-    @property
-    def tied(self) -> IntArray:
-        """Indices of the nodes that have a prior."""
-        if self.start_weight is None:
-            return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(np.any(self.start_weight > 0, axis=1))
-
-    def weighed(self, gaps: FloatArray) -> FloatArray:
-        """Return gaps (segments - 1, states) over what is allowed; none where the segments are unconnected."""
-        if self.gap_weight is None or self.count < 2:
-            return np.zeros((0, gaps.shape[1]))
-        return np.einsum("kij,kj->ki", self.gap_weight, gaps)
 
 
 @dataclass(frozen=True)

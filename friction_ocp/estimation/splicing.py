@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.simulation.grid import BoolArray, FloatArray
 
 APART = 0.3

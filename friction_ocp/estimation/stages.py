@@ -11,7 +11,8 @@ from friction_ocp.estimation.gap import gap_weights
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.program import Point, Program, Segments
+from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.simulation.grid import IntArray
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import casadi as ca
@@ -10,7 +10,6 @@ import numpy as np
 
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel, Drive
-from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import acceleration_noise, torque_covariance
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model, prepare_fit
@@ -18,7 +17,7 @@ from friction_ocp.estimation.problem import SEGMENT, Problem
 from friction_ocp.simulation.grid import FloatArray
 
 SHORTEST, MOST_SEGMENTS = 2, 3000
-"""Samples in a segment, and segments in one recording; more cost time."""
+"""Samples in a segment, and segments in one recording: more cost time, fewer blur what torque noise gathers within."""
 WITHIN = 0.1
 """Variance that torque noise may add within a segment over that of a channel: it is taken for noise of its samples."""
 QUARTERS = np.array([0.25, 0.5, 0.75, 1.0])
@@ -60,17 +59,46 @@ def speed_ratio(mech: Mechanism, numbers: Mapping[str, float], shaft: str) -> fl
     return float(function(*(numbers.get(name, 1.0) for name in mech.parameters)))
 
 
+def input_power(
+    drive: Drive, numbers: Mapping[str, float], noise: Callable[[Channel], tuple[float, float]]
+) -> dict[str, float]:
+    """Return by shaft the power density, (N m)^2/Hz, of the torque that noise of inputs makes.
+
+    `noise` gives the deviation of an input and its sampling interval, s.
+    """
+    power: dict[str, float] = {}
+    for shaft, channel, factor in driving(drive, numbers):
+        std, step = noise(channel)
+        power[shaft] = power.get(shaft, 0.0) + (factor * std) ** 2 * step
+    return power
+
+
+def seen_variance(mech: Mechanism, numbers: Mapping[str, float], covariances: FloatArray) -> FloatArray:
+    """Return (outputs,) the mean variance that states of covariances (k, states, states) have in angles and speeds."""
+    mean = dict(zip(mech.state_names, np.mean(np.einsum("sii->si", covariances), axis=0), strict=True))
+    added = np.zeros(len(mech.drive.outputs))
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part)
+        name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
+        if name in mean:
+            added[k] = speed_ratio(mech, numbers, channel.part) ** 2 * float(mean[name])
+    return added
+
+
 def stated_input_noise(model: Model) -> dict[str, float]:
     """Return by shaft the torque noise, N m/sqrt(Hz), that the `noise_std` of measured inputs makes at the guesses."""
-    first = model.problem.train[0]
-    values = model.space.numbers(model.nominal, first.name)
-    numbers = dict(zip(model.space.leaf_names, map(float, values), strict=True))
-    power: dict[str, float] = {}
-    for shaft, channel, factor in driving(model.problem.drive, numbers):
-        if channel.noise_std:
-            step = float(np.median(np.diff(first.recording.channels[channel.name].time)))
-            power[shaft] = power.get(shaft, 0.0) + (factor * channel.noise_std) ** 2 * step
-    return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
+    recording = model.problem.train[0].recording
+
+    def noise(channel: Channel) -> tuple[float, float]:
+        return channel.noise_std or 0.0, float(np.median(np.diff(recording.channels[channel.name].time)))
+
+    power = input_power(model.problem.drive, _numbers(model), noise)
+    return {shaft: float(np.sqrt(value)) for shaft, value in power.items() if value > 0.0}
+
+
+def _numbers(model: Model) -> dict[str, float]:
+    values = model.space.numbers(model.nominal, model.train[0].name)
+    return dict(zip(model.space.leaf_names, map(float, values), strict=True))
 
 
 def _with_options(model: Model, **changes: object) -> Model:
@@ -80,27 +108,14 @@ def _with_options(model: Model, **changes: object) -> Model:
 
 def _longest(model: Model) -> int:
     """Return the samples in the longest segments, no longer than usual, within which noise hardly moves a channel."""
-    item = model.train[0]
-    step = float(np.median(np.diff(item.grid.time)))
+    item, mech, numbers = model.train[0], model.drive.mechanism, _numbers(model)
+    density = acceleration_noise(mech, model.process_noise, np.array(list(numbers.values())))
+    still, step = np.zeros((len(mech.state_names),) * 2), float(np.median(np.diff(item.grid.time)))
+
+    def moves(samples: int) -> bool:
+        gathered = torque_covariance(mech, still, density, samples * step * QUARTERS)
+        return bool(np.any(seen_variance(mech, numbers, gathered) > WITHIN * model.noise**2))
+
     least = max(SHORTEST, *(-(-other.grid.time.size // MOST_SEGMENTS) for other in model.train))
     lengths = np.unique(np.geomspace(SHORTEST, SEGMENT, 12).round().astype(int))
-    short = [int(n) for n in lengths if np.all(_within(model, item, n * step) <= WITHIN * model.noise**2)]
-    return max(least, *short, SHORTEST)
-
-
-def _within(model: Model, item: Experiment, seconds: float) -> FloatArray:
-    """Return (outputs,) the mean variance that torque noise adds from a known start on, over some seconds."""
-    mech, drive = model.drive.mechanism, model.drive
-    numbers = model.space.numbers(model.nominal, item.name)
-    states = len(drive.state_names)
-    noise = acceleration_noise(mech, model.process_noise, numbers)
-    found = torque_covariance(mech, np.zeros((states, states)), noise, seconds * QUARTERS)
-    by_name = dict(zip(drive.state_names, np.einsum("sii->i", found) / QUARTERS.size, strict=True))
-    added = np.zeros(len(mech.drive.outputs))
-    for k, channel in enumerate(mech.drive.outputs):
-        group = mech.topology.group_of.get(channel.part)
-        name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
-        if name in by_name:
-            by_number = dict(zip(mech.parameters, numbers, strict=True))
-            added[k] = speed_ratio(mech, by_number, channel.part) ** 2 * by_name[name]
-    return added
+    return max([least, *(int(samples) for samples in lengths if not moves(int(samples)))])
