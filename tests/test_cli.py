@@ -124,7 +124,7 @@ def test_the_folder_is_named_after_problem_and_command(tmp_path: Path, monkeypat
 
 
 def test_an_iteration_limit_is_status_2_with_a_warning_first(tmp_path: Path) -> None:
-    """A fit that did not converge says so before anything else, in the result and on standard error."""
+    """A fit that did not converge says so before anything else, here and on standard error, and has no intervals."""
     ran = run(
         "identify",
         write_servo(tmp_path, loss="squares", max_iterations=1),
@@ -135,6 +135,8 @@ def test_an_iteration_limit_is_status_2_with_a_warning_first(tmp_path: Path) -> 
     assert ran.status == NOT_CONVERGED
     assert ran.result["status"] == "not_converged"
     assert "did not converge" in ran.result["warnings"][0]
+    assert all(item["std_error"] is None and item["interval95"] is None for item in ran.result["parameters"].values())
+    assert all(value is None for curve in ran.result["friction_curves"] for value in curve["lower"])
     assert ran.err.splitlines()[-1].startswith("identify: iteration limit")
 
 

@@ -47,9 +47,7 @@ def _clues_of(fitted: FittedModel) -> Clues:
     mech = fitted.model.drive.mechanism
     watch, names = _watch(mech)
     tables = [_table(fitted, index, watch, names) for index in range(len(fitted.linear.recordings))]
-    first = fitted.model.train[0].name
-    numbers = fitted.model.space.numbers(fitted.theta, first)
-    by_path = dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True))
+    by_path = fitted.model.space.numbers_by_path(fitted.theta, fitted.model.train[0].name)
     typical = _typical_torques(fitted, tables, by_path)
     free = fitted.footing.segment_s is None
     segment = fitted.model.problem.estimation.samples

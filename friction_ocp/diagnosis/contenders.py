@@ -66,14 +66,16 @@ def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> l
     """Return candidates that gain a notable share of the most where segments are loosely joined, two at least.
 
     All, where none is worth its parameters there by BIC over `count` samples: what moves free runs over minutes can be
-    hidden in short segments, and what is gained there is chance.
+    hidden in short segments, and what is gained there is chance. And those that lose as much: the model without them
+    is one of theirs, so that their fit is no judgement of them.
     """
-    worth = [gain > 0.5 * len(item.augmentation.off) * np.log(count) for item, gain in zip(tried, gains, strict=True)]
-    if not any(worth):
+    chance = [0.5 * len(item.augmentation.off) * np.log(count) for item in tried]
+    if not any(gain > least for gain, least in zip(gains, chance, strict=True)):
         return list(tried)
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     enough = MOST_ALIKE * gains[order[0]]
-    return [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
+    leading = [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
+    return _and(leading, [item for k, item in enumerate(tried) if gains[k] < -chance[k]])
 
 
 def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:

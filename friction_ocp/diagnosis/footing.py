@@ -135,10 +135,7 @@ def training_pieces(model: Model) -> tuple[Experiment, ...]:
 def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:
     """Return the common footing of all models, from the base model at `theta`; `loss` is that of free runs."""
     first, train = model.train[0], training_pieces(model)
-    numbers = {
-        use.name: dict(zip(model.space.leaf_names, model.space.numbers(theta, use.name), strict=True))
-        for use in model.problem.recordings
-    }
+    numbers = {use.name: model.space.numbers_by_path(theta, use.name) for use in model.problem.recordings}
     density = torque_noise(model, numbers[first.name])
     if is_held(model.problem.drive) and not any(density.values()):
         return Footing(density, numbers, None, model.noise, train, model.drive.input_names, loss)
@@ -234,8 +231,7 @@ def _leaf_numbers(model: Model, foot: Footing, recording: str) -> FloatArray:
 
 
 def _known_numbers(model: Model, foot: Footing, recording: str) -> dict[str, float]:
-    numbers = dict(zip(model.space.leaf_names, model.space.numbers(model.space.guess, recording), strict=True))
-    return {**numbers, **foot.numbers[recording]}
+    return {**model.space.numbers_by_path(model.space.guess, recording), **foot.numbers[recording]}
 
 
 def input_impulses(model: Model, item: Experiment, numbers: Mapping[str, float]) -> dict[str, FloatArray]:

@@ -32,8 +32,7 @@ def led_back(current: FittedModel, simpler: Model) -> FloatArray | None:
     """
     names = current.model.space.names
     gone = [k for k, name in enumerate(names) if name not in simpler.space.names]
-    numbers = simpler.space.numbers(simpler.space.guess, simpler.train[0].name)
-    stated = dict(zip(simpler.space.leaf_names, numbers, strict=True))
+    stated = simpler.space.numbers_by_path(simpler.space.guess, simpler.train[0].name)
     if not gone or any(names[k] not in stated for k in gone):
         return None
     course = _course(current.theta[gone], np.array([stated[names[k]] for k in gone]))

@@ -71,8 +71,7 @@ def _signals(problem: Problem, channel: Channel) -> list[Recorded]:
 def _guesses(problem: Problem) -> dict[str, float]:
     names = [leaf.path for leaf in drive_leaves(problem.drive)]
     space = parameter_space(problem, names)
-    values = space.numbers(space.guess, problem.recordings[0].name)
-    return dict(zip(space.leaf_names, values.tolist(), strict=True))
+    return space.numbers_by_path(space.guess, problem.recordings[0].name)
 
 
 def opened(stated: Problem, driven: Problem) -> list[str]:

@@ -87,8 +87,8 @@ def _hung(fitted: FittedModel, name: str) -> float:
     modes = {item.name: values.get(f"{mode_of(item.name)}.inertia") for item in model.problem.drive.shafts}
     if quantity != "inertia" or shaft not in modes or not any(modes.values()):
         return 0.0
-    numbers, _ = model.space.numbers_and_slope(fitted.theta, model.train[0].name)
-    joints = topology(bind_drive(model.problem.drive, dict(zip(model.space.leaf_names, numbers, strict=True))))
+    numbers = model.space.numbers_by_path(fitted.theta, model.train[0].name)
+    joints = topology(bind_drive(model.problem.drive, numbers))
     alike = [other for other in joints.members(joints.group_of[shaft]) if modes.get(other)]
     ratios = [float(joints.speed_ratio[other] / joints.speed_ratio[shaft]) for other in alike]
     hung = [(modes[other] or 0.0) - (0.0 if other == shaft else _lightened(fitted, other)) for other in alike]

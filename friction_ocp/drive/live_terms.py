@@ -61,6 +61,7 @@ def _motor(motor: Motor) -> Motor:
         cogging=_live(motor.cogging),
         torque_ripple=_live(motor.torque_ripple),
         lag=_on(motor.lag),
+        lag_hidden=None if is_off(motor.lag) else _on(motor.lag_hidden),
         dead_time=_on(motor.dead_time),
         saturation=_on(motor.saturation),
         saturation_sharpness=None if plain else motor.saturation_sharpness,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -104,6 +105,15 @@ def _controlled(mech: Mechanism, controller: Controller, motion: Motion) -> Any:
 def commands(mech: Mechanism, motion: Motion) -> ca.SX:
     """Return what the motors that lag are to follow."""
     return column([motor_command(mech, motor, motion) for motor in mech.lagging])
+
+
+def shown_lag(mech: Mechanism, motor: Motor, motion: Motion, signal: str) -> Motion:
+    """Return the motion with what drives a motor as far behind its command as a recording of that signal shows it."""
+    if motor.lag is None or motor.lag_hidden is None or mech.driving_signal(motor) != signal:
+        return motion
+    assert motion.lagged is not None
+    hidden = column([motor.lag_hidden if item.name == motor.name else 0.0 for item in mech.lagging])
+    return replace(motion, lagged=motion.lagged + hidden * (commands(mech, motion) - motion.lagged))
 
 
 def follows_smooth_command(mech: Mechanism, motor: Motor) -> bool:

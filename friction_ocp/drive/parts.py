@@ -189,9 +189,10 @@ class Motor:
     """An electric motor on a shaft; its back-EMF constant equals its torque constant.
 
     What drives it (current, torque or voltage) follows its command with the time constant `lag`, and all that is seen
-    of the drive is later than that by `dead_time`. The torque that a
-    current i would make is divided by (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the
-    torque over the torque constant where torque drives it.
+    of the drive is later than that by `dead_time`. A recorded current or voltage lags less than the motor by the share
+    `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
+    (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the torque over the torque constant
+    where torque drives it.
     """
 
     name: str
@@ -206,6 +207,7 @@ class Motor:
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
     dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
+    lag_hidden: Value = quantity("dimensionless", "share of the lag that a recorded current does not show", 0.0)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from friction_ocp.drive.motors import (
     motor_torque,
     motor_voltage,
     seen_by_controller,
+    shown_lag,
 )
 from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.drive.start import start_state
@@ -289,6 +290,7 @@ def _signal(
     if channel.signal == DRIVE_TORQUE:
         return drive_torque(mech, channel.part, at, holding), 0.0, 0.0
     motor = mech.drive.motor(channel.part)
+    at = shown_lag(mech, motor, at, channel.signal)
     if mech.topology.group_of[motor.shaft] in holding and mech.driving_signal(motor) is None:
         return holding_effort(mech, motor, at, holding, channel.signal), 0.0, 0.0
     value = {

@@ -22,6 +22,12 @@ def _shows_dead_time(drive: Drive) -> bool:
     return alone and is_off(drive.motors[0].dead_time) and len(drive.outputs) > 1
 
 
+def _shows_current(drive: Drive, motor: Motor) -> bool:
+    """Whether a channel shows what a controller drives a motor by: what it commands, or what comes of that."""
+    loop = drive.controller
+    return loop is not None and any(item.part == motor.name and item.signal == loop.output for item in drive.outputs)
+
+
 class DriveLagEffect(AbstractEffect):
     """The torque follows the command late."""
 
@@ -38,6 +44,11 @@ class DriveLagEffect(AbstractEffect):
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{motor.name}.lag"
         times = [step, 5.0 * step, 25.0 * step]
         lag = Free(times[0], 1e-3 * step, 1e3 * step)
+        if _shows_current(drive, motor):
+            hidden = f"{motor.name}.lag_hidden"
+            added = change_motor(drive, motor.name, lag=lag, lag_hidden=Free(0.5, 0.0, 1.0))
+            trials = tuple(Trial(({path: one}, {path: one, hidden: 1.0})) for one in times)
+            return Augmentation(added, {path: 0.0, hidden: 0.0}, trials)
         if not _shows_dead_time(drive):
             added = change_motor(drive, motor.name, lag=lag)
             return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in times))

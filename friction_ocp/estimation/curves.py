@@ -38,7 +38,10 @@ class FrictionCurve:
 def friction_curves(
     model: Model, theta: FloatArray, covariance: FloatArray, runs: tuple[FreeRun, ...]
 ) -> tuple[FrictionCurve, ...]:
-    """Return the friction of every shaft over the speeds that the recordings reach, with 95 % bands."""
+    """Return the friction of every shaft over the speeds that the recordings reach, with 95 % bands.
+
+    Parameters at a bound count as known there; where nothing is known of any, bands are NaN.
+    """
     mech = model.drive.mechanism
     curves: list[FrictionCurve] = []
     for shaft in mech.drive.shafts:
@@ -119,7 +122,7 @@ def _curve(
     numbers, slope = model.space.numbers_and_slope(theta, model.problem.fitted[0].name)
     values, by_active = function.map(grid.size)(grid[None, :], numbers)
     by_theta = np.asarray(by_active).reshape(grid.size, -1) @ slope
-    known = np.nan_to_num(covariance)
+    known = np.nan_to_num(covariance) if np.isfinite(covariance).any() else covariance
     reach = REACH * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by_theta, known, by_theta), 0.0))
     values = np.asarray(values).ravel()
     return FrictionCurve(shaft.name, element.law.name, load, grid, values, values - reach, values + reach)

@@ -115,7 +115,8 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     """Fit every parameter of a problem that has a guess.
 
     Raises FrictionOcpError where the recordings do not fit the drive, and Interrupted, which carries the last
-    iterate, on Ctrl-C. A fit that did not converge is returned with `converged` False and says why in `message`.
+    iterate, on Ctrl-C. A fit that did not converge is returned with `converged` False, says why in `message`, and has
+    NaN for standard errors and intervals.
     """
     began = time.perf_counter()
     model = prepare_identification(problem)
@@ -156,6 +157,8 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     judged = verdicts(model.space, theta, doubt)
     too_fast = beyond_sampling(model, theta, named_in_trades(model.space, judged))
     judged = beyond_the_log(model.space, judged, too_fast)
+    if not solution.converged:
+        doubt = doubt.withheld()
     parameters = _parameter_estimates(model, theta, doubt, judged)
     return Estimate(
         problem=problem,

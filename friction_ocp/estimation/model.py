@@ -142,10 +142,10 @@ def in_time(model: Model, theta: FloatArray, channels: Collection[str] | None = 
     items = {item.name: item for item in (*model.train, *model.validation)}
     late: dict[str, dict[str, float]] = {}
     for use in model.problem.recordings:
-        left = dict(zip(model.space.leaf_names, model.space.numbers(theta, use.name), strict=True))
+        left = model.space.numbers_by_path(theta, use.name)
         known = {name: use.late.get(name, 0.0) for name in model.drive.output_names}
         delays = {
-            name: undone + (float(left[f"{name}.delay"]) if channels is None or name in channels else 0.0)
+            name: undone + (left[f"{name}.delay"] if channels is None or name in channels else 0.0)
             for name, undone in known.items()
         }
         late[use.name] = lateness(items[use.name], delays, use.late)
@@ -311,7 +311,7 @@ def _speeds_of_points(space: ParameterSpace, problem: Problem, static: tuple[Sta
     """Return the range of speeds of every shaft over all static points, through springs as if they were rigid."""
     if not static:
         return {}
-    numbers = dict(zip(space.leaf_names, space.numbers(space.guess, static[0].name), strict=True))
+    numbers = space.numbers_by_path(space.guess, static[0].name)
     speed = np.abs(np.concatenate([term.speed for term in static]))
     typical, top = float(np.sqrt(np.mean(speed**2))), float(np.max(speed))
     ratios = steady_speeds(bind_drive(problem.drive, numbers))

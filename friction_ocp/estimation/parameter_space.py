@@ -67,6 +67,10 @@ class ParameterSpace:
                 array.flags.writeable = False
         return known[1], known[2]
 
+    def numbers_by_path(self, theta: FloatArray, recording: str) -> dict[str, float]:
+        """Return all numbers of the drive for a recording, by their paths."""
+        return dict(zip(self.leaf_names, self.numbers(theta, recording).tolist(), strict=True))
+
     def with_known(self, known: Mapping[str, float]) -> FloatArray:
         """Return values that are known by name, and the guess of every other parameter."""
         return np.array([known.get(name, guess) for name, guess in zip(self.names, self.guess, strict=True)])

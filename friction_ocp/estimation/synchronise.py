@@ -55,9 +55,9 @@ def _is_fitted(model: Model) -> bool:
 
 def _left(model: Model, theta: FloatArray, recording: str) -> dict[str, tuple[float, float]]:
     """Return by clock what the model still takes for offset and drift."""
-    numbers = dict(zip(model.space.leaf_names, model.space.numbers(theta, recording), strict=True))
+    numbers = model.space.numbers_by_path(theta, recording)
     clocks = model.problem.drive.clocks
-    return {item.name: (float(numbers[f"{item.path}.offset"]), float(numbers[f"{item.path}.drift"])) for item in clocks}
+    return {item.name: (numbers[f"{item.path}.offset"], numbers[f"{item.path}.drift"]) for item in clocks}
 
 
 def _found(model: Model, theta: FloatArray) -> Moves:

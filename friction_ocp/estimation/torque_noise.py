@@ -97,8 +97,7 @@ def stated_input_noise(model: Model) -> dict[str, float]:
 
 
 def _numbers(model: Model) -> dict[str, float]:
-    values = model.space.numbers(model.nominal, model.train[0].name)
-    return dict(zip(model.space.leaf_names, map(float, values), strict=True))
+    return model.space.numbers_by_path(model.nominal, model.train[0].name)
 
 
 def _with_options(model: Model, **changes: object) -> Model:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -33,7 +34,7 @@ class Uncertainty:
     """Standard errors of the parameters and how they were found."""
 
     covariance: FloatArray
-    """(parameters, parameters); rows and columns of parameters at a bound are NaN."""
+    """(parameters, parameters); rows and columns of parameters at a bound are NaN, all without convergence."""
     kind: str
     """`gauss_newton` or `sandwich`."""
     at_bound: BoolArray
@@ -57,6 +58,10 @@ class Uncertainty:
         """Return (parameters, 2) intervals at 95 %."""
         reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.freedom)) * self.std_error
         return np.column_stack([theta - reach, theta + reach])
+
+    def withheld(self) -> Uncertainty:
+        """Return it without covariance: that of an iterate that is no optimum says nothing of the parameters."""
+        return dataclasses.replace(self, covariance=np.full_like(self.covariance, np.nan))
 
 
 def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, white: bool, absolute: bool) -> Uncertainty:

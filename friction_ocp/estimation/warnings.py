@@ -47,7 +47,10 @@ def warnings_of(
     """Return every reason to doubt the answer, the gravest first."""
     texts: list[str] = []
     if not solution.converged:
-        texts.append(f"The solver did not converge: {solution.message}. The values below are its last iterate.")
+        texts.append(
+            f"The solver did not converge: {solution.message}. The values below are its last iterate, which has no "
+            "standard errors."
+        )
     texts += [_parameter_warning(item) for item in parameters if item.verdict.word not in ("ok", "traded")]
     texts += _trade_warnings([item for item in parameters if item.verdict.word == "traded"])
     texts += _misfit_warnings(doubt, residuals, scored)

@@ -67,8 +67,7 @@ def _led(fitted: FittedModel, motion: Motion, speed: float, limits: Limits) -> t
     recording is what that command does to the model.
     """
     problem = fitted.model.problem
-    numbers = fitted.model.space.numbers(fitted.theta, problem.train[0].name)
-    bound = bind_drive(problem.drive, dict(zip(fitted.model.space.leaf_names, map(float, numbers), strict=True)))
+    bound = bind_drive(problem.drive, fitted.model.space.numbers_by_path(fitted.theta, problem.train[0].name))
     time = _time(problem.train)
     share = speed * motion.speed(time / time[-1])
     drive = _watched(bound if bound.controller is not None else _looped(fitted, bound, limits))
@@ -199,7 +198,7 @@ _PER_TORQUE = ("torque", "current", "current_command", "voltage")
 def _inertia(fitted: FittedModel) -> float:
     """Return the inertia of the whole drive at its first shaft, kg m^2."""
     model, name = fitted.model, fitted.model.problem.train[0].name
-    numbers = dict(zip(model.space.leaf_names, model.space.numbers(fitted.theta, name), strict=True))
+    numbers = model.space.numbers_by_path(fitted.theta, name)
     total, ratio, shaft = 0.0, {model.problem.drive.shafts[0].name: 1.0}, model.problem.drive.shafts
     for _ in model.problem.drive.transmissions:
         for item in model.problem.drive.transmissions:

@@ -113,6 +113,7 @@ class MotorSection(Section):
     cogging: CoggingTerm = None
     torque_ripple: TorqueRippleTerm = None
     lag: Number = 0.0
+    lag_hidden: Number = 0.0
     dead_time: Number = 0.0
     saturation: Number = 0.0
     saturation_sharpness: Number = SHARPNESS

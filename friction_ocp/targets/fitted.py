@@ -97,12 +97,10 @@ def fitted_of(estimate: Estimate) -> Fitted:
 
 
 def _fitted(model: Model, theta: FloatArray, title: str, path: Path) -> Fitted:
-    space = model.space
-    first = model.problem.fitted[0].name
-    numbers = dict(zip(space.leaf_names, space.numbers(theta, first), strict=True))
+    numbers = model.space.numbers_by_path(theta, model.problem.fitted[0].name)
     stated = {leaf.path: leaf.value for leaf in drive_leaves(model.problem.drive)}
     plain = {name: float(value) for name, value in stated.items() if isinstance(value, (int, float))}
-    drive = live_terms(bind_drive(model.problem.drive, plain | {name: float(value) for name, value in numbers.items()}))
+    drive = live_terms(bind_drive(model.problem.drive, plain | numbers))
     for leaf in drive_leaves(drive):
         assert not isinstance(leaf.value, (Free, Tie)), leaf.path
     name = re.sub(r"\W+", "_", title).strip("_") or "drive"

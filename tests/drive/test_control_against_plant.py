@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
+from plant import Plant, PlantAmplifier, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 from twin import Bench, Run, Twin, worst
 
 from friction_ocp.drive.parts import Channel, Controller, Drive, Motor, Shaft
@@ -88,6 +88,21 @@ def test_a_sampled_loop_sees_its_channel_as_late_as_it_is() -> None:
         runs.append(Twin(plant, {"reference.theta": ANGLE, "reference.omega": SPEED}).run(2.0))
     (truth, ours), (_, punctual) = runs
     assert worst(truth, ours, "axis.theta") < expansion < 0.02 * worst(truth, punctual, "axis.theta")
+
+
+@pytest.mark.parametrize("shown", ["current", "command"])
+def test_a_current_is_shown_behind_the_lag_or_before_it(shown: str) -> None:
+    """A motor that follows its controller late: a channel shows what it does, or what it is told to."""
+    controller = PlantController(type="cascade", kp=5.0, kd=0.3, ki=2.0, **SLOW, **LOOP)
+    amplifier = PlantAmplifier(time_constant=5e-3)
+    motor = PlantMotor("drive", "axis", torque_constant=0.5, controller="loop", amplifier=amplifier)
+    shaft = PlantShaft("axis", 0.01, PlantFriction("coulomb_viscous", tau_c=0.05, viscous=0.01))
+    sensors = (PlantSensor("seen", "axis.theta", controller.sample_time), PlantSensor("shown", f"drive.{shown}"))
+    plant = Plant((shaft,), (), (motor,), (controller,), sensors)
+    twin = Twin(plant, {"reference.theta": ANGLE, "reference.omega": SPEED})
+    first = float(twin.run(0.01)[0]["shown"][0])
+    truth, run = twin.run(2.0, {"drive.lagged": first})
+    assert worst(truth, run, "axis.theta", "axis.omega", "shown") < STEP_ERROR
 
 
 def servo(controller: Controller, motor: Motor) -> Bench:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -107,7 +107,8 @@ def _eccentric(sensor: PlantSensor) -> Channel:
     if wave is not None and sensor.measures.endswith(".theta"):
         offset += sensor.gain * wave.cosine
     eccentricity = None if wave is None else Eccentricity(wave.cosine, wave.sine)
-    known = (sensor.name, sensor.measures, "output", sensor.gain, offset, sensor.delay, sensor.resolution)
+    measures = sensor.measures.replace(".command", ".current")
+    known = (sensor.name, measures, "output", sensor.gain, offset, sensor.delay, sensor.resolution)
     return Channel(*known, eccentricity=eccentricity)
 
 
@@ -140,7 +141,8 @@ def _transmission(item: PlantTransmission) -> Transmission:
     )
 
 
-def _motor(motor: PlantMotor) -> Motor:
+def _motor(motor: PlantMotor, sensors: Sequence[PlantSensor]) -> Motor:
+    """Return the motor of the plant, its recorded current being its command where a sensor measures that."""
     voltage, saturation = motor.drive == "voltage", motor.saturation
     assert saturation is None or saturation.form == "algebraic"
     return Motor(
@@ -155,6 +157,7 @@ def _motor(motor: PlantMotor) -> Motor:
         0.0 if motor.amplifier is None else motor.amplifier.time_constant,
         0.0 if saturation is None else saturation.current**-2.0,
         2.0 if saturation is None else saturation.sharpness,
+        lag_hidden=float(any(item.measures == f"{motor.name}.command" for item in sensors)),
     )
 
 
@@ -185,7 +188,7 @@ def drive_of(plant: Plant, inputs: Mapping[str, Trajectory | float]) -> Drive:
     return Drive(
         shafts=tuple(_shaft(shaft) for shaft in plant.shafts),
         transmissions=tuple(_transmission(t) for t in plant.transmissions),
-        motors=tuple(_motor(motor) for motor in plant.motors),
+        motors=tuple(_motor(motor, plant.sensors) for motor in plant.motors),
         controller=_controller(plant.controllers[0], plant.motors[0].drive) if plant.controllers else None,
         channels=(*driven, *sensors, *(Channel(name, name) for name in seen)),
     )
