@@ -122,6 +122,7 @@ def candidate(effect: str, *sizes: float, gain: float = 1.0) -> Screened:
     [
         ([5.0, 9.0, 1.0, 8.0, 2.0], [1, 3, 0]),
         ([0.1, 9.0, 0.2, 0.3, 0.4], [1, 4]),
+        ([-9.0, 9.0, 5.0, 8.0, 0.4], [1, 3, 2, 0]),
         ([1.0, 0.0, 3.0, -np.inf, 0.5], [0, 1, 2, 3, 4]),
     ],
 )
@@ -130,7 +131,8 @@ def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with
 ) -> None:
     """What either prediction promises is fitted there; the best two, and what gains half as much, are refitted.
 
-    All are where what is gained there may be chance: less than half the logarithm of a thousand samples.
+    All are where what is gained there may be chance: less than half the logarithm of a thousand samples. What loses
+    more than that was not fitted to its end, and is refitted, too.
     """
     large, small = candidate("cogging", 1.0, gain=3.0), candidate("load_dependence", 1.0)
     last = [candidate("warm_up", 1.0, gain=0.5 - 0.1 * k) for k in range(BEGUN)]

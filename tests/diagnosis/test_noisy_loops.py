@@ -2,72 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import CURRENT_NOISE, ENCODER_STEP, SECONDS, STEP, axis, diagnosed, write_case
-from plant import Plant, PlantController, PlantSensor, Trajectory, reversing_steps
+from diagnosis_cases import STEP, diagnosed
+from looped_axis import CHANNELS, written
 
 from friction_ocp import simulate
 from friction_ocp.diagnosis.loop import driven_as_recorded, opened
 from friction_ocp.drive.control import noise_gain
 from friction_ocp.drive.parts import Controller
 from friction_ocp.problem_file.load import load_problem
-from friction_ocp.recording.hdf5 import write_recording
-from friction_ocp.recording.recording import Channel, Recording
 
-TACHO_NOISE, UNBALANCE = 0.3, 0.05
-"""rad/s, N m."""
-GAINS = {"kp": 0.06, "ki": 0.6, "sample_time": STEP}
-UNITS = {"wanted": "rad/s", "position": "rad", "speed": "rad/s", "current": "A"}
-CHANNELS: dict[str, dict[str, Any]] = {
-    "wanted": {"measures": "reference.omega", "role": "input", "hold": "zero"},
-    "position": {"measures": "motor.theta", "resolution": float(ENCODER_STEP)},
-    "speed": {"measures": "motor.omega", "noise_std": TACHO_NOISE},
-    "current": {"measures": "motor.current", "noise_std": CURRENT_NOISE},
-}
-
-
-def looped(unbalance: float, feedback: str) -> Plant:
-    """Return the axis under a speed loop that sees its tachometer with the noise that is logged, or without any."""
-    plain = axis()
-    return replace(
-        plain,
-        shafts=(replace(plain.shafts[0], gravity=(unbalance, 0.3)),),
-        motors=(replace(plain.motors[0], controller="loop"),),
-        controllers=(PlantController("loop", "pi_velocity", feedback, **GAINS),),
-        sensors=(
-            *plain.sensors,
-            PlantSensor("speed", "motor.omega", period=STEP, noise_std=TACHO_NOISE),
-            PlantSensor("quiet", "motor.omega", period=STEP),
-        ),
-    )
-
-
-def written(folder: Path, unbalance: float = 0.0, feedback: str = "speed") -> Path:
-    """Write three recordings and a problem whose model is right but for the unbalance."""
-    path, time = (
-        write_case(folder, axis(), effects=["unbalance", "stribeck", "sensor_delay"]),
-        np.arange(0, SECONDS, STEP),
-    )
-    for k, name in enumerate("abc"):
-        rng = np.random.default_rng(20 + k)
-        steps = reversing_steps(np.array([2.0, 6.0, 15.0]), (0.2, 0.6), SECONDS, rng)
-        wanted = np.interp(time, np.asarray(steps.time), np.asarray(steps.value))
-        run = looped(unbalance, feedback).simulate(SECONDS, {"reference.omega": Trajectory(time, wanted, "zero")}, rng)
-        found = {key: Channel(key, *run.channels[key], UNITS[key]) for key in UNITS if key in run.channels}
-        seen = found["position"].time
-        found["wanted"] = Channel("wanted", seen, np.append(wanted, wanted[-1])[: seen.size], "rad/s")
-        write_recording(Recording(name, found), folder / f"{name}.h5")
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["controller"] = {"type": "pi_velocity", "feedback": "speed", "output": "current", **GAINS}
-    document["channels"] = CHANNELS
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    return path
+UNBALANCE = 0.05
+"""N m."""
 
 
 def test_the_noise_of_a_loop_is_no_gap(tmp_path: Path) -> None:
