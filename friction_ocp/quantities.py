@@ -143,7 +143,10 @@ def to_si(
         target = DIMENSIONS[dimension_of(unit, where)]
         return _convert(array, unit, target), target
     if scale is None:
-        remedy = "state it, for example scale: 2*pi/4096 rad"
+        remedy = (
+            "state what one count is, such as 2*pi/4096 rad, as text: in the attribute `scale` of the dataset of a "
+            "recording, or as `scale` in an import map"
+        )
         raise FrictionOcpError(Finding(where, f"unit '{unit}' has no scale", "counts need a stated scale", remedy))
     factor, unit_of_scale = parse_scale(scale, where)
     target = DIMENSIONS[dimension_of(unit_of_scale, where)]
@@ -168,7 +171,7 @@ def parse_scale(text: str, where: str = "quantities") -> tuple[float, str]:
     if match is not None:
         factor = _product(match[1] + match[2])
     if match is None or not np.isfinite(factor) or factor == 0.0:
-        allowed = "a number of a unit for one count, such as 2*pi/4096 rad or 0.001 N m"
+        allowed = "a number with its unit, which is what one count is, such as 2*pi/4096 rad or 0.001 N m"
         raise FrictionOcpError(Finding(where, f"cannot read scale '{text}'", allowed))
     return factor, match[3].strip()
 

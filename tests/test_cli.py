@@ -175,10 +175,14 @@ def test_check_lists_findings(tmp_path: Path) -> None:
 
 
 def test_check_of_a_sound_problem(tmp_path: Path) -> None:
-    """Nothing found is status 0."""
+    """Nothing found is status 0, and what was read is said."""
     ran = run("check", write_servo(tmp_path))
     assert ran.status == DONE
-    assert ran.out.endswith("nothing is wrong with it\n")
+    what, *parts = ran.out.strip().split("; ")
+    assert what.endswith("nothing is wrong with it")
+    assert parts[0] == "read: shafts: servo (coulomb_viscous), pendulum (none)" and parts[2] == "out: pendulum.theta"
+    assert parts[3].startswith("fitted: ") and "servo.friction.tau_c" in parts[3]
+    assert parts[4].endswith("to train") and parts[5].endswith("to validate")
 
 
 @pytest.mark.parametrize("command", ["check", "identify", "simulate"])

@@ -119,7 +119,7 @@ def test_counts_convert_by_their_scale() -> None:
     assert unit == "rad"
     assert to_si([2], "count", scale="0.5 mA")[0][0] == pytest.approx(1e-3)
     with pytest.raises(
-        FrictionOcpError, match=r"m.yaml: unit 'counts' has no scale; counts need a stated scale; state it"
+        FrictionOcpError, match=r"m.yaml: unit 'counts' has no scale; counts need a stated scale; state what one"
     ):
         to_si([1], "counts", "m.yaml")
     with pytest.raises(

@@ -22,9 +22,12 @@ def add_commands(commands: Any) -> None:
 def _check(options: argparse.Namespace) -> int:
     from friction_ocp.problem_file.check import check
     from friction_ocp.problem_file.load import load_problem
+    from friction_ocp.problem_file.summary import summary
 
+    told = ""
     try:
-        findings = check(load_problem(options.problem))
+        problem = load_problem(options.problem)
+        findings, told = check(problem), summary(problem)
     except FrictionOcpError as error:
         findings = error.findings
     if options.json:
@@ -34,5 +37,5 @@ def _check(options: argparse.Namespace) -> int:
         for finding in findings:
             print(f"{finding.severity}: {finding}" if finding.severity == "warning" else finding)
         if not findings:
-            print(f"{options.problem}: nothing is wrong with it")
+            print(f"{options.problem}: nothing is wrong with it; read: {told}")
     return WRONG_INPUT if any(finding.severity == "error" for finding in findings) else DONE

@@ -35,12 +35,17 @@ def turnover_text(channel: Channel, found: Turnover) -> str:
     return f"channel '{channel.name}' jumps {times} by {turn} within one sample, {first}: it starts over like a counter"
 
 
+def missing(channel: Channel) -> tuple[tuple[float, float], ...]:
+    """Return the gaps in the samples of a channel, from when to when."""
+    sound = channel.values.shape == channel.time.shape
+    return gaps(channel.time[np.isfinite(channel.values)]) if sound else ()
+
+
 def gap_texts(channels: Iterable[Channel]) -> Iterator[str]:
     """Yield what is to be said of gaps in the samples of channels; those with the same gaps stand in one sentence."""
     found: dict[tuple[tuple[float, float], ...], list[Channel]] = {}
     for channel in channels:
-        if channel.values.shape == channel.time.shape:
-            found.setdefault(gaps(channel.time[np.isfinite(channel.values)]), []).append(channel)
+        found.setdefault(missing(channel), []).append(channel)
     for places, having in found.items():
         if places:
             longest = max(places, key=lambda gap: gap[1] - gap[0])

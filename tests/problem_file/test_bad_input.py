@@ -675,7 +675,7 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
     ),
     "two sensors of one shaft in different units": (
         put("channels/second", {"measures": "load.omega"}),
-        "channels.second: 'second' moves 57.3 times as far as 'position' and the other sensor of this shaft",
+        "channels.second: 'second' moves 57.3 times as far as 'position', not 1 times as one shaft has it",
     ),
     "time in milliseconds": (
         put("channels/current/hold", "zero"),
@@ -687,7 +687,8 @@ WARNINGS: dict[str, tuple[Callable[[Content], None], str]] = {
     ),
     "missing samples": (
         put("channels/current/hold", "zero"),
-        "no samples of 'position' from 0.9980 s to 1.4000 s, 0.402 s where 0.002 s is usual (the longest of 2 gaps); ",
+        "no samples of 'position' from 0.9980 s to 1.4000 s, 0.402 s where 0.002 s is usual (the longest of 2 gaps); "
+        "nothing is compared there",
     ),
     "repeated measurement": (
         put("channels/current/hold", "zero"),

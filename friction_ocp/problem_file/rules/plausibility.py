@@ -13,7 +13,7 @@ from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise
-from friction_ocp.recording.doubts import ACROSS_GAPS, AS_NEW, gap_texts, repeats, repeats_text
+from friction_ocp.recording.doubts import ACROSS_GAPS, AS_NEW, gap_texts, missing, repeats, repeats_text
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
 
@@ -91,8 +91,10 @@ def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
         factor = float(np.median(factors))
         if 1.0 / _RATIO_SLIP <= factor <= _RATIO_SLIP:
             continue
-        expected = "what the ratios in the file say" if first.part != second.part else "the other sensor of this shaft"
-        what = f"'{second.name}' moves {factor:.3g} times as far as '{first.name}' and {expected}"
+        known = case.ratio(first.part, second.part) or 1.0
+        expected = "the ratios in the file say" if first.part != second.part else "one shaft has it"
+        seen, stated = f"{factor / known:.3g} times as far as '{first.name}'", f"{1.0 / known:.3g} times as {expected}"
+        what = f"'{second.name}' moves {seen}, not {stated}"
         allowed = "ratio: speed of the first shaft over that of the second, in rad/m where the second moves in a line"
         remedy = "correct the ratio or its sign, or the unit, scale or sign of one of the two"
         yield Finding(case.at(f"channels.{second.name}"), what, allowed, remedy, "warning")
@@ -129,13 +131,23 @@ def samples_come_often_enough(case: Case) -> Iterator[Finding]:
 
 
 def samples_have_no_gaps(case: Case) -> Iterator[Finding]:
-    """Where a recording was interrupted, nobody knows what drove the machine; held inputs may come when they change."""
-    steady = [channel.name for channel in case.drive.channels if channel.role == "output" or channel.hold == "linear"]
+    """Where a recording was interrupted, nobody knows what drove the machine; held inputs may come when they change.
+
+    Where outputs alone are missing, it is known.
+    """
+    driving = [channel.name for channel in case.drive.inputs if channel.hold == "linear"]
     for place, use in case.uses():
-        known = [use.recording.channels[name] for name in steady if name in use.recording.channels]
-        for text in gap_texts(known):
+        known = {item.name: use.recording.channels.get(item.name) for item in case.drive.channels}
+        inputs, where = [known[name] for name in driving], case.at_recording(place, use)
+        lost = {gap for item in inputs if item is not None for gap in missing(item)}
+        interrupted = [item for item in known.values() if item is not None and lost & set(missing(item))]
+        for text in gap_texts(interrupted):
             remedy = "split the recording there if the machine moved meanwhile"
-            yield Finding(case.at_recording(place, use), text, ACROSS_GAPS, remedy, "warning")
+            yield Finding(where, text, ACROSS_GAPS, remedy, "warning")
+        seeing = [known[item.name] for item in case.drive.outputs]
+        blind = [text for text in gap_texts(item for item in seeing if item is not None and item not in interrupted)]
+        if blind:
+            yield Finding(where, "; ".join(blind), "nothing is compared there", severity="warning")
 
 
 def samples_are_not_repeated(case: Case) -> Iterator[Finding]:
