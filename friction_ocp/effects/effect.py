@@ -9,25 +9,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.units import DRIVE_TORQUE
+from friction_ocp.effects.spectrum import LINES, MOST_LINES, peaks, spectrum, without
 from friction_ocp.parameters import Free
-
-ndimage: Any = _ndimage  # its own types are incomplete
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-PEAKS = 4
-"""Periods that are tried."""
 SHARP = 0.04
 """Damping over inertia and angular frequency of what is heard ringing."""
-LINES, MOST_LINES = 600, 4000
-"""Frequencies at which a spectrum is looked at."""
-NEIGHBOURS = 41
-"""Lines over which the level of a spectrum is told, itself in the middle."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +48,12 @@ class Track:
     """Over the segments of the fit: what is slow, and little noise."""
     finely: Missing
     """Over a few samples each: what is fast, too, and more noise."""
+
+    def ordinary(self, shaft: str) -> FloatArray:
+        """Return (segments, 4) what constant torque, friction and inertia of a shaft do over the fine segments."""
+        at, omega = self.finely.middle, self.omega[shaft]
+        shapes = [np.ones(self.time.size), np.sign(omega), omega, np.gradient(omega, self.time)]
+        return np.column_stack([shape[at] for shape in shapes])
 
 
 @dataclass(frozen=True)
@@ -91,8 +89,9 @@ class Clues:
         """Return the likeliest periods of the missing torque of a shaft over its angle ("theta") or "time".
 
         They are seen twice at least, or come back with every turn: what is longer is a trend. `against_motion` looks
-        for a wave times the sign of the speed, `against_torque` times a motor's torque. Without a missing torque,
-        harmonics of a turn, or parts of the longest recording.
+        for a wave times the sign of the speed, `against_torque` times a motor's torque. What parameters that are off
+        add to the missing torque goes with speed and acceleration, and these with the angle: waves are looked for
+        without that, too. Without a missing torque, harmonics of a turn, or parts of the longest recording.
         """
         asked = (shaft, over, against_motion, against_torque)
         if asked not in self._known_periods:
@@ -107,7 +106,7 @@ class Clues:
         if over == "theta":
             lowest = min(lowest, 1.0 / (2.0 * np.pi))
         frequencies = frequencies[frequencies >= lowest]
-        power = np.zeros(frequencies.size)
+        power, beyond = np.zeros(frequencies.size), np.zeros(frequencies.size)
         for track, one in zip(self.tracks, place, strict=True):
             at = track.finely.middle
             if at.size < 8:
@@ -117,11 +116,14 @@ class Clues:
                 factor = np.sign(track.omega[shaft][at])
             if against_torque is not None:
                 factor = track.torque[against_torque][at]
-            power += _spectrum(one[at] - one[0], track.finely.torque[shaft], factor, frequencies)
+            torque = track.finely.torque[shaft]
+            power += spectrum(one[at] - one[0], torque, factor, frequencies)
+            left = without(torque, track.ordinary(shaft))
+            beyond += spectrum(one[at] - one[0], left, factor, frequencies)
         if not np.any(power):
             turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
             return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
-        return [float(1.0 / frequencies[k]) for k in _peaks(power)]
+        return [float(1.0 / frequencies[k]) for k in peaks(power, beyond)]
 
     def _frequencies(self, place: Sequence[FloatArray], travel: float) -> FloatArray:
         """Return frequencies half a cycle apart over the travel, up to half a cycle per segment at typical speed."""
@@ -150,28 +152,6 @@ class Clues:
         speed = np.abs(self.steady.get(shaft, self.speeds(shaft)))
         moving = speed[speed > 1e-3 * float(np.max(speed, initial=0.0))]
         return [float(value) for value in np.quantile(moving, shares)] if moving.size else [1.0 for _ in shares]
-
-
-def _spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """Return the share of squares that a wave of each frequency takes, at uneven places (Lomb 1976)."""
-    plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
-    power: list[FloatArray] = []
-    for some in np.array_split(frequencies, max(1, frequencies.size // LINES)):
-        turns = 2.0 * np.pi * some[:, None] * place
-        basis = factor * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        gram, pull = basis @ basis.swapaxes(1, 2), basis @ plain
-        power.append(np.einsum("kp,kpq,kq->k", pull, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), pull))
-    return np.concatenate(power)
-
-
-def _peaks(power: FloatArray) -> list[int]:
-    """Return the places of the highest peaks, and of those highest over the level around them, in turn."""
-    inner = np.concatenate([[-np.inf], power, [-np.inf]])
-    peaks = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
-    level = np.maximum(ndimage.median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
-    orders = [peaks[np.argsort(-height[peaks])] for height in (power, power / level)]
-    in_turn = [int(k) for pair in zip(*orders, strict=True) for k in pair]
-    return list(dict.fromkeys(in_turn))[:PEAKS]
 
 
 @dataclass(frozen=True)

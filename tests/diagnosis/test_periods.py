@@ -19,6 +19,8 @@ from friction_ocp.statistics.execution import Execution
 SAMPLES, INTERVAL, SEGMENT = 6000, 1e-3, 4
 SPEED, TEETH = 60.0, 24
 """rad/s of the motor, and waves in a turn."""
+WAVE = 2.0
+"""rad: a period of friction."""
 
 
 def clues(wave: float, drift: float) -> Clues:
@@ -40,6 +42,24 @@ def test_a_wave_is_found_beside_a_larger_drift(drift: float) -> None:
     found = clues(0.1, drift).periods("motor", "theta")
     travel = 2.0 * SPEED / np.pi
     assert min(abs(1.0 / period - TEETH / (2.0 * np.pi)) for period in found[:2]) < 1.0 / travel
+
+
+def test_a_wave_of_friction_is_found_beside_what_parameters_could_do() -> None:
+    """Moves to and fro with dwells, whose speed and acceleration go with the angle: a torque of either is no wave."""
+    rng = np.random.default_rng(4)
+    time = INTERVAL * np.arange(SAMPLES)
+    omega = SPEED * np.sin(2.0 * np.pi * time / 1.5) ** 3 * (1.0 + 0.3 * np.sin(2.0 * np.pi * time / 5.0))
+    theta, middle = INTERVAL * np.cumsum(omega), np.arange(SEGMENT // 2, SAMPLES, SEGMENT)
+    wave = 0.2 * np.sign(omega) * np.cos(2.0 * np.pi * theta / WAVE)
+    parameters = omega / SPEED + 0.05 * np.gradient(omega, time) / SPEED
+    found = dict[str, float]()
+    for name, size in (("wave", 0.0), ("both", 1.0)):
+        torque = (wave + size * parameters)[middle] + 0.01 * rng.standard_normal(middle.size)
+        missing = Missing(middle, {"motor": torque})
+        track = Track(time, {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}, missing, missing)
+        periods = Clues((track,), {}, {"motor": 1.0}).periods("motor", "theta", against_motion=True)
+        found[name] = min(abs(1.0 / period - 1.0 / WAVE) for period in periods)
+    assert max(found.values()) < 1.0 / float(np.ptp(theta))
 
 
 def test_a_wave_is_found_through_a_coarse_encoder(tmp_path: Path) -> None:

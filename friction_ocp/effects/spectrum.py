@@ -1,0 +1,60 @@
+"""Which waves are in a torque that was seen at uneven places."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
+
+from friction_ocp.simulation.grid import FloatArray
+
+ndimage: Any = _ndimage  # its own types are incomplete
+
+PEAKS = 6
+"""Periods that are tried."""
+LINES, MOST_LINES = 600, 4000
+"""Frequencies at which a spectrum is looked at."""
+NEIGHBOURS = 41
+"""Lines over which the level of a spectrum is told, itself in the middle."""
+
+
+def spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Return the share of squares that a wave of each frequency takes, at uneven places (Lomb 1976)."""
+    plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
+    power: list[FloatArray] = []
+    for some in np.array_split(frequencies, max(1, frequencies.size // LINES)):
+        turns = 2.0 * np.pi * some[:, None] * place
+        basis = factor * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        gram, pull = basis @ basis.swapaxes(1, 2), basis @ plain
+        power.append(np.einsum("kp,kpq,kq->k", pull, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), pull))
+    return np.concatenate(power)
+
+
+def without(values: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Return (n,) values without what (n, shapes) shapes do of them."""
+    size = np.linalg.norm(shapes, axis=0)
+    own = shapes / np.where(size > 0, size, 1.0)
+    return values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
+
+
+def peaks(power: FloatArray, beyond: FloatArray) -> list[int]:
+    """Return the places of the highest peaks of two spectra, and of those highest over the level around them, in turn.
+
+    `power` is that of all that is missing, `beyond` that of what parameters cannot make up for.
+    """
+    heights = (power, power / _level(power), beyond, beyond / _level(beyond))
+    orders = [_by_height(height, of) for height, of in zip(heights, (power, power, beyond, beyond), strict=True)]
+    longest = max(order.size for order in orders)
+    in_turn = [int(order[k]) for k in range(longest) for order in orders if k < order.size]
+    return list(dict.fromkeys(in_turn))[:PEAKS]
+
+
+def _by_height(height: FloatArray, power: FloatArray) -> FloatArray:
+    inner = np.concatenate([[-np.inf], power, [-np.inf]])
+    found = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
+    return found[np.argsort(-height[found])]
+
+
+def _level(power: FloatArray) -> FloatArray:
+    return np.maximum(ndimage.median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
