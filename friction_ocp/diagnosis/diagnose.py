@@ -155,7 +155,8 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
         return stated
     tell("the inputs read the other way", 0.0)
     final, accepted, left = stated.final, stated.accepted, stated.left_over
-    able = [pair for pair in readings.fitted(stated.base) if explains_more(pair[1], final, accepted, left)]
+    others = readings.fitted(stated.base)
+    able = [pair for pair in others if explains_more(pair[1], stated.base, final, accepted, left)]
     if not able:
         return stated
     other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)

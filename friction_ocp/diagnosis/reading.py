@@ -60,13 +60,24 @@ def read_otherwise(problem: Problem, fitted: FittedModel) -> FittedModel:
     return freed(timed(polished(model, foot, fitted.theta, None)))
 
 
-def explains_more(base: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool) -> bool:
-    """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest."""
+def explains_more(
+    base: FittedModel, stated: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool
+) -> bool:
+    """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest.
+
+    Or where more than noise is left, does more than one of the additions to the `stated` base model did in its turn:
+    they may stand in for it.
+    """
     left = innovations(final)
     fewer = [[other for other in accepted if other != key] for key in accepted]
     if any(_ratio_with(base, keys, final) <= left.ratio * DOUBTED for keys in fewer):
         return True
-    return left_over and _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond
+    if not left_over:
+        return False
+    if _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
+        return True
+    turns = range(len(accepted))
+    return any(_ratio_with(base, accepted[:k], final) < _ratio_with(stated, accepted[: k + 1], final) for k in turns)
 
 
 def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
