@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -137,6 +138,7 @@ def test_an_iteration_limit_is_status_2_with_a_warning_first(tmp_path: Path) -> 
     assert "did not converge" in ran.result["warnings"][0]
     assert all(item["std_error"] is None and item["interval95"] is None for item in ran.result["parameters"].values())
     assert all(value is None for curve in ran.result["friction_curves"] for value in curve["lower"])
+    assert not re.search(r"^servo\.\S+ .* ok$", ran.out, re.MULTILINE)
     assert ran.err.splitlines()[-1].startswith("identify: iteration limit")
 
 

@@ -53,7 +53,7 @@ def warnings_of(
         )
     texts += [_parameter_warning(item) for item in parameters if item.verdict.word not in ("ok", "traded")]
     texts += _trade_warnings([item for item in parameters if item.verdict.word == "traded"])
-    texts += _misfit_warnings(doubt, residuals, scored)
+    texts += _misfit_warnings(doubt, residuals, scored, solution.converged)
     return tuple(texts)
 
 
@@ -93,14 +93,16 @@ def _trade_warnings(traded: Sequence[NamedVerdict]) -> list[str]:
     return texts
 
 
-def _misfit_warnings(doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored) -> list[str]:
+def _misfit_warnings(
+    doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored, converged: bool
+) -> list[str]:
     texts: list[str] = []
     coloured = sum(not test.white for tests in residuals.values() for test in tests.values())
     total = sum(len(tests) for tests in residuals.values())
     if coloured:
+        robust = f", and the standard errors are the robust ({doubt.kind}) ones" if converged else ""
         texts.append(
-            f"Residuals are not white in {coloured} of {total} recorded channels: the model misses something, and the "
-            f"standard errors are the robust ({doubt.kind}) ones."
+            f"Residuals are not white in {coloured} of {total} recorded channels: the model misses something{robust}."
         )
     for name, (errors, _) in scored.validation_errors.items():
         train = scored.train_errors[name][0]

@@ -76,7 +76,7 @@ def parameter_rows(parameters: Mapping[str, Json]) -> list[ParameterRow]:
 
 def _parameter_row(name: str, parameter: Json) -> ParameterRow:
     value, std_error = parameter.get("value"), parameter.get("std_error")
-    verdict = str(parameter.get("verdict", ""))
+    verdict = _judged_word(parameter)
     unit = str(parameter.get("unit", ""))
     return ParameterRow(
         name=name,
@@ -93,6 +93,12 @@ def _parameter_row(name: str, parameter: Json) -> ParameterRow:
         rank=_ORDER.index(verdict) if verdict in _ORDER else len(_ORDER),
         traded_with=tuple(str(other) for other in rows(parameter, "traded_with")),
     )
+
+
+def _judged_word(parameter: Json) -> str:
+    """Return the verdict of a parameter; nothing where it would be ok, and yet has no interval: of no optimum."""
+    verdict = str(parameter.get("verdict", ""))
+    return "" if verdict == "ok" and "interval95" in parameter and parameter["interval95"] is None else verdict
 
 
 def _interval(bounds: Sequence[Any], std_error: Any) -> Cell:
