@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
 
 ndimage: Any = _ndimage  # its own types are incomplete
 
@@ -50,7 +50,7 @@ def peaks(power: FloatArray, beyond: FloatArray) -> list[int]:
     return list(dict.fromkeys(in_turn))[:PEAKS]
 
 
-def _by_height(height: FloatArray, power: FloatArray) -> FloatArray:
+def _by_height(height: FloatArray, power: FloatArray) -> IntArray:
     inner = np.concatenate([[-np.inf], power, [-np.inf]])
     found = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
     return found[np.argsort(-height[found])]
