@@ -30,5 +30,5 @@ def summary(problem: Problem) -> str:
 def _amount(uses: Sequence[RecordingUse], purpose: str) -> list[str]:
     if not uses:
         return []
-    samples = sum(max(channel.time.size for channel in use.recording.channels.values()) for use in uses)
+    samples = sum(max((one.time.size for one in use.recording.channels.values()), default=0) for use in uses)
     return [f"{samples} samples in {len(uses)} recording{'s' * (len(uses) > 1)} {purpose}"]
