@@ -91,7 +91,8 @@ def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
         factor = float(np.median(factors))
         if 1.0 / _RATIO_SLIP <= factor <= _RATIO_SLIP:
             continue
-        known = case.ratio(first.part, second.part) or 1.0
+        known = case.ratio(first.part, second.part)
+        assert known is not None, "or no factor would be known"
         expected = "the ratios in the file say" if first.part != second.part else "one shaft has it"
         seen, stated = f"{factor / known:.3g} times as far as '{first.name}'", f"{1.0 / known:.3g} times as {expected}"
         what = f"'{second.name}' moves {seen}, not {stated}"
@@ -136,18 +137,19 @@ def samples_have_no_gaps(case: Case) -> Iterator[Finding]:
     Where outputs alone are missing, it is known.
     """
     driving = [channel.name for channel in case.drive.inputs if channel.hold == "linear"]
+    seeing = [channel.name for channel in case.drive.outputs]
     for place, use in case.uses():
-        known = {item.name: use.recording.channels.get(item.name) for item in case.drive.channels}
-        inputs, where = [known[name] for name in driving], case.at_recording(place, use)
-        lost = {gap for item in inputs if item is not None for gap in missing(item)}
-        interrupted = [item for item in known.values() if item is not None and lost & set(missing(item))]
-        for text in gap_texts(interrupted):
+        names = [item.name for item in case.drive.channels if item.name in use.recording.channels]
+        found = {name: missing(use.recording.channels[name]) for name in names}
+        lost = {gap for name in driving for gap in found.get(name, ())}
+        interrupted = [name for name, own in found.items() if not lost.isdisjoint(own)]
+        for text in gap_texts(use.recording.channels[name] for name in interrupted):
             remedy = "split the recording there if the machine moved meanwhile"
-            yield Finding(where, text, ACROSS_GAPS, remedy, "warning")
-        seeing = [known[item.name] for item in case.drive.outputs]
-        blind = [text for text in gap_texts(item for item in seeing if item is not None and item not in interrupted)]
+            yield Finding(case.at_recording(place, use), text, ACROSS_GAPS, remedy, "warning")
+        alone = [name for name in seeing if name in found and name not in interrupted]
+        blind = "; ".join(gap_texts(use.recording.channels[name] for name in alone))
         if blind:
-            yield Finding(where, "; ".join(blind), "nothing is compared there", severity="warning")
+            yield Finding(case.at_recording(place, use), blind, "nothing is compared there", severity="warning")
 
 
 def samples_are_not_repeated(case: Case) -> Iterator[Finding]:
