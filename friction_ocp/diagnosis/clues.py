@@ -14,15 +14,16 @@ from friction_ocp.diagnosis.footing import group_inertias
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.mechanism import Mechanism, column
 from friction_ocp.drive.motors import motor_torque
-from friction_ocp.drive.parts import Motor
+from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.estimation.torque_noise import speed_ratio
 from friction_ocp.execution.effort import once
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import Squares
 
 SMOOTHING_STEPS = 4
@@ -30,7 +31,9 @@ FINE, MOST_FINE = 4, 3000
 """Samples in the segments that show what torque is missing as finely as recordings tell; most such segments in one."""
 
 MISSED = 0.1
-"""Torque that may be missing over that which moves a shaft. Ten times more or less shows the same waves."""
+"""Torque that may be missing over that which moves a shaft, unless recordings need more."""
+LARGER = 3
+"""Times that it grows to what was found with less."""
 
 _known: WeakKeyDictionary[FittedModel, Clues] = WeakKeyDictionary()
 
@@ -49,13 +52,37 @@ def _clues_of(fitted: FittedModel) -> Clues:
     tables = [_table(fitted, index, watch, names) for index in range(len(fitted.linear.recordings))]
     by_path = fitted.model.space.numbers_by_path(fitted.theta, fitted.model.train[0].name)
     typical = _typical_torques(fitted, tables, by_path)
-    free = fitted.footing.segment_s is None
-    segment = fitted.model.problem.estimation.samples
-    coarse = _smoothers(fitted, segment, typical) if free else fitted.linear.recordings
-    longest = max(item.grid.time.size for item in fitted.linear.program.experiments)
-    finely = _smoothers(fitted, max(FINE, longest // MOST_FINE), typical)
-    tracks = tuple(_track(fitted, *parts) for parts in zip(tables, coarse, finely, strict=True))
+    tracks = tuple(
+        _track(fitted, *parts) for parts in zip(tables, *_torques(fitted, watch, names, typical), strict=True)
+    )
     return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path))
+
+
+def _torques(
+    fitted: FittedModel, watch: ca.Function, names: list[str], typical: Mapping[str, float]
+) -> tuple[list[Missing], list[Missing]]:
+    """Return what torque is missing in every recording, over the segments of the fit and over a few samples each."""
+
+    def pulled(samples: int, size: Mapping[str, float]) -> list[Missing]:
+        return [_missing(fitted, item, watch, names) for item in _smoothers(fitted, samples, size)]
+
+    items = fitted.linear.program.experiments
+    fine = max(FINE, max(item.grid.time.size for item in items) // MOST_FINE)
+    size = {shaft: MISSED * torque for shaft, torque in typical.items()}
+    finely = pulled(fine, size)
+    for _ in range(LARGER):
+        seen = {shaft: _rms([item.torque[shaft] for item in finely]) for shaft in size}
+        if all(seen[shaft] <= size[shaft] for shaft in size):
+            break
+        size = {shaft: max(seen[shaft], size[shaft]) for shaft in size}
+        finely = pulled(fine, size)
+    if fitted.footing.segment_s is None:
+        return pulled(fitted.model.problem.estimation.samples, size), finely
+    return [_missing(fitted, item, watch, names) for item in fitted.linear.recordings], finely
+
+
+def _rms(parts: Sequence[FloatArray]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if any(part.size for part in parts) else 0.0
 
 
 def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[str, FloatArray]:
@@ -96,29 +123,33 @@ def states_along(fitted: FittedModel, index: int) -> FloatArray:
 
 
 def _table(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]) -> dict[str, FloatArray]:
-    """Return (n,) motions of all shafts and torques of all motors along a recording, by name."""
+    """Return (n,) time, motions of all shafts and torques of all motors along a recording, by name."""
     item = fitted.linear.program.experiments[index]
+    seen = _seen(fitted, item, watch, names, states_along(fitted, index), np.arange(item.grid.time.size))
+    return {"time": item.grid.time, **seen}
+
+
+def _seen(
+    fitted: FittedModel, item: Experiment, watch: ca.Function, names: list[str], states: FloatArray, at: IntArray
+) -> dict[str, FloatArray]:
+    """Return (n,) what is watched in (n, states) states at (n,) nodes of the grid of a recording, by name."""
     numbers = fitted.model.space.numbers(fitted.theta, item.name)
-    states = states_along(fitted, index)
-    seen = np.asarray(watch.map(item.grid.time.size)(states.T, item.grid.at_node.T, numbers))
+    seen = np.asarray(watch.map(at.size)(states.T, item.grid.at_node[at].T, numbers))
     return {name: seen[k] for k, name in enumerate(names)}
 
 
-def _track(
-    fitted: FittedModel, table: Mapping[str, FloatArray], coarse: LinearRecording, fine: LinearRecording
-) -> Track:
-    mech = fitted.model.drive.mechanism
-
-    def of(kind: str) -> dict[str, FloatArray]:
-        return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in mech.drive.shafts}
-
-    torque = {motor.name: table[f"{motor.name}.torque"] for motor in mech.drive.motors}
-    missing, finely = _missing(fitted, coarse), _missing(fitted, fine)
-    return Track(coarse.item.grid.time, of("theta"), of("omega"), torque, missing, finely)
+def _track(fitted: FittedModel, table: Mapping[str, FloatArray], missing: Missing, finely: Missing) -> Track:
+    drive = fitted.model.problem.drive
+    torque = {motor.name: table[f"{motor.name}.torque"] for motor in drive.motors}
+    return Track(table["time"], _of(drive, table, "theta"), _of(drive, table, "omega"), torque, missing, finely)
 
 
-def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
-    """Return the middle samples of segments and the mean torque that would close the gap behind each, by shaft."""
+def _of(drive: Drive, table: Mapping[str, FloatArray], kind: str) -> dict[str, FloatArray]:
+    return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in drive.shafts}
+
+
+def _missing(fitted: FittedModel, smoother: LinearRecording, watch: ca.Function, names: list[str]) -> Missing:
+    """Return the mean torque that would close the gap behind each segment, and the motion with all these torques."""
     mech, first = fitted.model.drive.mechanism, smoother.cut.first
     middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
     name = smoother.item.name
@@ -134,10 +165,12 @@ def _missing(fitted: FittedModel, smoother: LinearRecording) -> Missing:
             ratio = speed_ratio(mech, fitted.footing.numbers[name], shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
         missing[shaft.name] = torque
-    return Missing(middle, missing)
+    nodes = _seen(fitted, smoother.item, watch, names, smoother.nodes, first[:-1])
+    motion = {name: 0.5 * (values[1:] + values[:-1]) for name, values in nodes.items()}
+    return Missing(middle, missing, _of(mech.drive, motion, "theta"), _of(mech.drive, motion, "omega"))
 
 
-def _smoothers(fitted: FittedModel, samples: int, typical: Mapping[str, float]) -> tuple[LinearRecording, ...]:
+def _smoothers(fitted: FittedModel, samples: int, size: Mapping[str, float]) -> tuple[LinearRecording, ...]:
     """Return recordings cut into segments between which torques may pull, to see which would make the recordings.
 
     The torques are taken to be noise of the size that may be missing, a new one in every segment. Of noise in the
@@ -148,7 +181,7 @@ def _smoothers(fitted: FittedModel, samples: int, typical: Mapping[str, float]) 
     """
     items = fitted.linear.program.experiments
     span = samples * float(np.median(np.diff(items[0].grid.time)))
-    density = {shaft: MISSED * torque * float(np.sqrt(span)) for shaft, torque in typical.items()}
+    density = {shaft: torque * float(np.sqrt(span)) for shaft, torque in size.items()}
     options = replace(fitted.model.problem.estimation, segment=samples, process_noise=density, estimated_noise=())
     model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options), noise_levels=())
     program = relaxed(model, items, 0.0, Squares())

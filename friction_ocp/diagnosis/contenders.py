@@ -67,7 +67,7 @@ def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> l
 
     All, where none is worth its parameters there by BIC over `count` samples: what moves free runs over minutes can be
     hidden in short segments, and what is gained there is chance. And those that lose as much: the model without them
-    is one of theirs, so that their fit is no judgement of them.
+    is one of theirs, so that their fit is no judgement of them. And what promises most of all for free runs.
     """
     chance = [0.5 * len(item.augmentation.off) * np.log(count) for item in tried]
     if not any(gain > least for gain, least in zip(gains, chance, strict=True)):
@@ -75,7 +75,8 @@ def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> l
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     enough = MOST_ALIKE * gains[order[0]]
     leading = [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
-    return _and(leading, [item for k, item in enumerate(tried) if gains[k] < -chance[k]])
+    most = max(range(len(tried)), key=lambda k: tried[k].gain)
+    return _and(leading, [item for k, item in enumerate(tried) if k == most or gains[k] < -chance[k]])
 
 
 def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:

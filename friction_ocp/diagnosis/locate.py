@@ -49,8 +49,8 @@ def _variables(clues: Clues, shaft: str) -> Mapping[str, FloatArray]:
         return np.concatenate(parts)
 
     found = {
-        f"{shaft}.omega": joined([track.omega[shaft] for track in clues.tracks]),
-        f"{shaft}.theta": joined([track.theta[shaft] for track in clues.tracks]),
+        f"{shaft}.omega": np.concatenate([track.missing.omega[shaft] for track in clues.tracks]),
+        f"{shaft}.theta": np.concatenate([track.missing.theta[shaft] for track in clues.tracks]),
         "time": joined([track.time - track.time[0] for track in clues.tracks]),
     }
     for motor in clues.tracks[0].torque:

@@ -10,16 +10,18 @@ import numpy as np
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import training_pieces
+from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import judged_alike
-from friction_ocp.estimation.model import late_of, prepare, with_drive, with_late
+from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.simulation.grid import FloatArray
 
 _DRIVING = ("current", "current_command", "torque", "voltage")
 
@@ -57,7 +59,25 @@ def read_otherwise(problem: Problem, fitted: FittedModel) -> FittedModel:
     """Return a base model fitted to inputs that are read as another problem says, from where it stands."""
     model = with_late(judged_alike(prepare(problem)), late_of(fitted.model))
     foot = replace(fitted.footing, train=training_pieces(model))
-    return freed(timed(polished(model, foot, fitted.theta, None)))
+    return freed(timed(_begun_at(fitted, model, foot, fitted.theta)))
+
+
+def _begun_at(known: FittedModel, model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
+    """Fit a model from some parameters and where the segments of a known one begin.
+
+    Where that comes to less than what is known, from where the parameters say that segments begin, too.
+    """
+    nodes = known.linear.point.nodes if _shapes(model, foot) == _shapes(known.model, known.footing) else None
+    end = polished(model, foot, theta, nodes)
+    if nodes is not None and not end.objective <= known.objective:
+        end = min(end, polished(model, foot, theta, None), key=lambda one: one.objective)
+    return end
+
+
+def _shapes(model: Model, foot: Footing) -> list[tuple[int, int]]:
+    """Return how many segments each recording has, and how many states."""
+    states = int(state_symbols(model.drive.mechanism).x.numel())
+    return [(cut.count, states) for cut in foot.training(model).segments]
 
 
 def explains_more(
@@ -69,14 +89,18 @@ def explains_more(
     they may stand in for it.
     """
     left = innovations(final)
-    fewer = [[other for other in accepted if other != key] for key in accepted]
-    if any(_ratio_with(base, keys, final) <= left.ratio * DOUBTED for keys in fewer):
+    if not accepted:
+        return left_over and _ratio_with(base, (), final) - 1.0 < (1.0 - OF_REST) * left.beyond
+    but_last = _ratio_with(base, accepted[:-1], final)
+    fewer = ([other for other in accepted if other != key] for key in accepted[:-1])
+    enough = left.ratio * DOUBTED
+    if but_last <= enough or any(_ratio_with(base, keys, final) <= enough for keys in fewer):
         return True
     if not left_over:
         return False
-    if _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
+    if but_last < left.ratio or _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
         return True
-    turns = range(len(accepted))
+    turns = range(len(accepted) - 1)
     return any(_ratio_with(base, accepted[:k], final) < _ratio_with(stated, accepted[: k + 1], final) for k in turns)
 
 
@@ -89,7 +113,7 @@ def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> f
         return innovations(base).ratio
     model = with_drive(base.model, with_additions(base, keys))
     known = {**base.values, **final.values}
-    fitted = polished(model, base.footing, model.space.with_known(known), None)
+    fitted = _begun_at(base, model, base.footing, model.space.clip(model.space.with_known(known)))
     return innovations(fitted).ratio if fitted.holds else np.inf
 
 

@@ -123,8 +123,7 @@ def exchanged(
             if swapped is None or not swapped.holds:
                 continue
             gains = -benchmark.dearer(swapped)
-            more = swapped.cost < current.cost - UNIMPORTANT and benchmark.certain(gains, level, rng)
-            if more or benchmark.simpler(swapped):
+            if benchmark.beaten(swapped, gains, level, rng) or benchmark.simpler(swapped):
                 seen.add(held.key)
                 former = [held.refitted(current, gains), *tried]
                 held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
@@ -138,6 +137,12 @@ def exchanged(
             current, benchmark = leader.fitted, _Benchmark(leader.fitted)
             accepted = made[leader.key]
     return current, done, accepted
+
+
+def beats(other: FittedModel, current: FittedModel, level: float, rng: np.random.Generator) -> bool:
+    """Whether another model explains more than the current one for certain, on recordings left out."""
+    benchmark = _Benchmark(current)
+    return benchmark.beaten(other, -benchmark.dearer(other), level, rng)
 
 
 @dataclass(frozen=True)
@@ -293,6 +298,10 @@ class _Benchmark:
         """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
         fewer = self.fitted.determined - other.determined
         return fewer > 0 and other.cost - self.fitted.cost < schwarz(self.blocks) * fewer
+
+    def beaten(self, other: FittedModel, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
+        """Whether another model explains more, and its (blocks,) gains are more than chance."""
+        return other.cost < self.fitted.cost - UNIMPORTANT and self.certain(gains, level, rng)
 
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""

@@ -20,7 +20,7 @@ from friction_ocp.diagnosis.left_out import left_out_before_and_after
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
+from friction_ocp.diagnosis.reexamine import beats, exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
@@ -36,6 +36,7 @@ from friction_ocp.diagnosis.worth import (
     shapes,
     shortlist,
 )
+from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
 
@@ -246,6 +247,31 @@ class Search:
         if len(set(self.accepted)) > 1:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()
+        elif self.accepted:
+            self._resembling()
+
+    def _resembling(self) -> None:
+        """Put what resembles the only addition in its place where its more general shape explains more for certain.
+
+        In the shape that the catalogue gives them the one may come nearer to what the other is on the machine.
+        """
+        first = next(item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted)
+        held = self.accepted[0]
+        alike, clues = effects()[held[0]].resembles, self.bench.clues
+        most = (1.0 - MOST_OF) * first.before.cost + MOST_OF * self.bench.current.cost
+        able = (item for item in first.choice.rivals if item.key[0] in alike and item.standing.cost < most)
+        grown = [item for item in able if may_grow(item.screened.augmentation.drive, item.key, clues)]
+        if not grown or self._exhausted():
+            return
+        rival = min(grown, key=lambda item: item.standing.cost)
+        done = self._round(self.bench.at(rival.fitted), [rival.key], NONE)
+        if done.accepted is None or not beats(done.accepted.fitted, self.bench.current, self.level, self.rng):
+            return
+        self.tell(f"{rival.key[0]} in the place of {held[0]}", 0.0)
+        self.bench = self.bench.at(done.accepted.fitted)
+        choice = with_first(first.choice, rival)
+        self.rounds = [replace(first, choice=replace(choice, aliases=choice.same), accepted=rival), done]
+        self.accepted = [rival.key, done.accepted.key]
 
     def _left_out(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
         """Return free runs where recordings took no part, of the base model and of the current one of a bench."""

@@ -125,7 +125,7 @@ def _deflections(shaft: Shaft, omega: float) -> list[float]:
         return []
     if omega == 0.0:
         return [0.0] * shaft.friction.law.bristle_count
-    bent = np.asarray(ca.DM(ca.SX(shaft.friction.bent_deflection(ca.SX(omega)))), dtype=float)
+    bent = np.asarray(ca.DM(ca.SX(shaft.friction.steady_deflection(ca.SX(omega)))), dtype=float)
     return [float(one) for one in bent.ravel()]
 
 

@@ -30,6 +30,10 @@ class Missing:
     """(segments,) the sample in the middle of each."""
     torque: Mapping[str, FloatArray]
     """By shaft (segments,) the torque if that shaft is where the model lacks one, N m."""
+    theta: Mapping[str, FloatArray]
+    """By shaft (segments,) rad, where it was with this torque: on its own the model may lose its way."""
+    omega: Mapping[str, FloatArray]
+    """By shaft (segments,) rad/s, how fast."""
 
 
 @dataclass(frozen=True)
@@ -99,39 +103,40 @@ class Clues:
         return list(self._known_periods[asked])
 
     def _periods(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[float]:
-        place = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
-        travel = max(float(np.ptp(one)) for one in place)
+        fine = [track.finely for track in self.tracks]
+        whole = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
+        place = [
+            item.theta[shaft] if over == "theta" else track.time[item.middle]
+            for item, track in zip(fine, self.tracks, strict=True)
+        ]
+        travel = max(float(np.ptp(one)) for one in whole)
         frequencies = self._frequencies(place, travel)
         lowest = 2.0 / max(travel, 1e-300)
         if over == "theta":
             lowest = min(lowest, 1.0 / (2.0 * np.pi))
         frequencies = frequencies[frequencies >= lowest]
         power, beyond = np.zeros(frequencies.size), np.zeros(frequencies.size)
-        for track, one in zip(self.tracks, place, strict=True):
-            at = track.finely.middle
-            if at.size < 8:
+        for track, item, one in zip(self.tracks, fine, place, strict=True):
+            if one.size < 8:
                 continue
-            factor = np.ones(at.size)
+            factor = np.ones(one.size)
             if against_motion:
-                factor = np.sign(track.omega[shaft][at])
+                factor = np.sign(item.omega[shaft])
             if against_torque is not None:
-                factor = track.torque[against_torque][at]
-            torque = track.finely.torque[shaft]
-            power += spectrum(one[at] - one[0], torque, factor, frequencies)
+                factor = track.torque[against_torque][item.middle]
+            torque = item.torque[shaft]
+            power += spectrum(one - one[0], torque, factor, frequencies)
             left = without(torque, track.ordinary(shaft))
-            beyond += spectrum(one[at] - one[0], left, factor, frequencies)
+            beyond += spectrum(one - one[0], left, factor, frequencies)
         if not np.any(power):
             turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
             return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
         return [float(1.0 / frequencies[k]) for k in peaks(power, beyond)]
 
-    def _frequencies(self, place: Sequence[FloatArray], travel: float) -> FloatArray:
+    @staticmethod
+    def _frequencies(place: Sequence[FloatArray], travel: float) -> FloatArray:
         """Return frequencies half a cycle apart over the travel, up to half a cycle per segment at typical speed."""
-        steps = [
-            np.sqrt(np.mean(np.diff(one[track.finely.middle]) ** 2))
-            for track, one in zip(self.tracks, place, strict=True)
-            if track.finely.middle.size > 1
-        ]
+        steps = [np.sqrt(np.mean(np.diff(one) ** 2)) for one in place if one.size > 1]
         fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
         lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
         return np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -43,17 +44,17 @@ def peaks(power: FloatArray, beyond: FloatArray) -> list[int]:
 
     `power` is that of all that is missing, `beyond` that of what parameters cannot make up for.
     """
-    heights = (power, power / _level(power), beyond, beyond / _level(beyond))
-    orders = [_by_height(height, of) for height, of in zip(heights, (power, power, beyond, beyond), strict=True)]
+    orders = [order for of in (power, beyond) for order in _by_height(of, (of, of / _level(of)))]
     longest = max(order.size for order in orders)
     in_turn = [int(order[k]) for k in range(longest) for order in orders if k < order.size]
     return list(dict.fromkeys(in_turn))[:PEAKS]
 
 
-def _by_height(height: FloatArray, power: FloatArray) -> IntArray:
+def _by_height(power: FloatArray, heights: Sequence[FloatArray]) -> list[IntArray]:
+    """Return the places of all peaks of a spectrum in the orders of several heights."""
     inner = np.concatenate([[-np.inf], power, [-np.inf]])
     found = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
-    return found[np.argsort(-height[found])]
+    return [found[np.argsort(-height[found])] for height in heights]
 
 
 def _level(power: FloatArray) -> FloatArray:

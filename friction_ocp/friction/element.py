@@ -147,10 +147,6 @@ class FrictionElement:
         sides = [self.load.along(side).viscous for side in ("positive", "negative")]
         return viscous + transmitted * where(omega >= 0, sides[0], sides[1])
 
-    def steady_deflection(self, omega: Any) -> Any:
-        """Return the deflection of a bristle, or those of several, in steady motion, rounded at standstill."""
-        return smooth_sign(omega, 0.1 * getattr(self.law.along("positive"), "omega_s", 1.0)) * self._bent(omega)
-
     def sticking_deflection(self, omega: Any, torque: Any, inertia: Any) -> tuple[Any, Any]:
         """Return the deflection at which one bristle holds a torque at a speed near rest, and how far that can be.
 
@@ -168,7 +164,7 @@ class FrictionElement:
         balance = (torque - (damping + self._sigma(2, omega)) * omega) / (stiffness * share)
         return where(balance > reach, reach, where(balance < -reach, -reach, balance)), kept
 
-    def bent_deflection(self, omega: Any) -> Any:
+    def steady_deflection(self, omega: Any) -> Any:
         """Return the deflection, or those of several bristles, that belongs to steady motion at `omega`."""
         return smooth_sign(omega, 0.0) * self._bent(omega)
 

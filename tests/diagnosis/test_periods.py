@@ -31,7 +31,12 @@ def clues(wave: float, drift: float) -> Clues:
     theta = SPEED * (1.0 - np.cos(2.0 * np.pi * time / 2.0)) / np.pi
     middle = np.arange(SEGMENT // 2, SAMPLES, SEGMENT)
     torque = wave * np.cos(TEETH * theta[middle] + 0.4) + drift * np.sin(omega[middle] / SPEED)
-    missing = Missing(middle, {"motor": torque + 0.01 * rng.standard_normal(middle.size)})
+    missing = Missing(
+        middle,
+        {"motor": torque + 0.01 * rng.standard_normal(middle.size)},
+        {"motor": theta[middle]},
+        {"motor": omega[middle]},
+    )
     track = Track(time, {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}, missing, missing)
     return Clues((track,), {}, {"motor": 1.0})
 
@@ -55,7 +60,7 @@ def test_a_wave_of_friction_is_found_beside_what_parameters_could_do() -> None:
     found = dict[str, float]()
     for name, size in (("wave", 0.0), ("both", 1.0)):
         torque = (wave + size * parameters)[middle] + 0.01 * rng.standard_normal(middle.size)
-        missing = Missing(middle, {"motor": torque})
+        missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
         track = Track(time, {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}, missing, missing)
         periods = Clues((track,), {}, {"motor": 1.0}).periods("motor", "theta", against_motion=True)
         found[name] = min(abs(1.0 / period - 1.0 / WAVE) for period in periods)
@@ -72,3 +77,16 @@ def test_a_wave_is_found_through_a_coarse_encoder(tmp_path: Path) -> None:
     travel = float(np.ptp(bench.clues.angles("motor")))
     found = bench.clues.periods("motor", "theta")
     assert min(abs(1.0 / item - 1.0 / period) for item in found[:2]) < 1.0 / travel
+
+
+def test_a_wave_is_found_where_the_model_loses_its_way(tmp_path: Path) -> None:
+    """A ripple that takes the simulated motor waves away shows over the angle at which the motor really was."""
+    period, plain = 2.0 * np.pi / 12.0, axis()
+    sensor = replace(plain.sensors[0], resolution=2.0 * np.pi / 2**9)
+    motor = replace(plain.motors[0], torque_ripple=PlantRipple(period, (0.9,), (0.2,)))
+    plant = replace(plain, motors=(motor,), sensors=(sensor, plain.sensors[1]))
+    clues = open_bench(load_problem(write_case(tmp_path, plant)), Execution(InProcess())).clues
+    found = clues.periods("motor", "theta", against_torque=motor.name)
+    lost = [track.theta["motor"][track.finely.middle] - track.finely.theta["motor"] for track in clues.tracks]
+    assert max(float(np.ptp(one)) for one in lost) > period
+    assert abs(1.0 / found[0] - 1.0 / period) < 1.0 / float(np.ptp(clues.angles("motor")))

@@ -98,8 +98,9 @@ def lacking(period: float) -> Clues:
     theta = 20.0 * time
     middle = np.arange(2, 6000, 4)
     torque = 0.02 * np.cos(2.0 * np.pi * theta[middle] / period)
-    missing = Missing(middle, {"motor": torque, "load": 5.0 * torque})
     angles, speeds = {"motor": theta, "load": theta / 5.0}, {"motor": np.full(6000, 20.0), "load": np.full(6000, 4.0)}
+    there = [{name: values[middle] for name, values in each.items()} for each in (angles, speeds)]
+    missing = Missing(middle, {"motor": torque, "load": 5.0 * torque}, *there)
     track = Track(time, angles, speeds, {"drive": np.ones(6000)}, missing, missing)
     return Clues((track,), {"motor-load.stiffness": 800.0}, {"motor": 1.0, "load": 5.0})
 
