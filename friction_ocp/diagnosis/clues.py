@@ -72,9 +72,9 @@ def _torques(
     finely = pulled(fine, size)
     for _ in range(LARGER):
         seen = {shaft: _rms([item.torque[shaft] for item in finely]) for shaft in size}
-        if all(seen[shaft] <= size[shaft] for shaft in size):
+        if not any(seen[shaft] > size[shaft] for shaft in size):
             break
-        size = {shaft: max(seen[shaft], size[shaft]) for shaft in size}
+        size = {shaft: max(size[shaft], seen[shaft]) for shaft in size}
         finely = pulled(fine, size)
     if fitted.footing.segment_s is None:
         return pulled(fitted.model.problem.estimation.samples, size), finely
