@@ -55,7 +55,8 @@ def without_superfluous(
 ) -> tuple[FittedModel, list[Key]]:
     """Drop earlier additions that the latest one has made superfluous on recordings left out.
 
-    Superfluous is what neither gains for certain there nor is worth an addition in sum.
+    Superfluous is what neither gains for certain there nor is worth an addition in sum; beside what leaves no more than
+    noise, what is not worth its parameters.
     """
     current, benchmark = bench.current, _Benchmark(bench.current)
     earlier = list(dict.fromkeys(accepted[:-1]))
@@ -66,7 +67,8 @@ def without_superfluous(
         if simpler is None or not simpler.holds:
             continue
         gains = benchmark.dearer(simpler)
-        if not benchmark.certain(gains, level, rng) and float(np.sum(gains)) < required(bench.base, simpler):
+        little = float(np.sum(gains)) < required(bench.base, simpler) or benchmark.simpler(simpler)
+        if little and not benchmark.certain(gains, level, rng):
             current, accepted, benchmark = simpler, kept, _Benchmark(simpler)
     return current, accepted
 

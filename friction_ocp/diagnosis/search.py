@@ -23,7 +23,7 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import beats, exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
+from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn, without
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.worth import (
     ALMOST,
@@ -248,30 +248,43 @@ class Search:
             self.tell("weighing rivals of earlier additions again", 0.0)
             self._exchange()
         elif self.accepted:
-            self._resembling()
+            self._weigh_shapes()
 
-    def _resembling(self) -> None:
-        """Put what resembles the only addition in its place where its more general shape explains more for certain.
+    def _weigh_shapes(self) -> None:
+        """Weigh the only addition against what it resembles or may be, each in the shape that the recordings give it.
 
-        In the shape that the catalogue gives them the one may come nearer to what the other is on the machine.
+        In the shape that the catalogue gives them the one may come nearer to what the other is on the machine, and a
+        shape tells apart what was as likely before.
         """
-        first = next(item for item in self.rounds if item.accepted is not None and item.accepted.key in self.accepted)
         held = self.accepted[0]
-        alike, clues = effects()[held[0]].resembles, self.bench.clues
+        first = next(item for item in self.rounds if item.accepted is not None and item.accepted.key == held)
+        alike, choice, beaten = effects()[held[0]].resembles, first.choice, set[Key]()
         most = (1.0 - MOST_OF) * first.before.cost + MOST_OF * self.bench.current.cost
-        able = (item for item in first.choice.rivals if item.key[0] in alike and item.standing.cost < most)
-        grown = [item for item in able if may_grow(item.screened.augmentation.drive, item.key, clues)]
-        if not grown or self._exhausted():
-            return
-        rival = min(grown, key=lambda item: item.standing.cost)
-        done = self._round(self.bench.at(rival.fitted), [rival.key], NONE)
-        if done.accepted is None or not beats(done.accepted.fitted, self.bench.current, self.level, self.rng):
-            return
-        self.tell(f"{rival.key[0]} in the place of {held[0]}", 0.0)
-        self.bench = self.bench.at(done.accepted.fitted)
-        choice = with_first(first.choice, rival)
-        self.rounds = [replace(first, choice=replace(choice, aliases=choice.same), accepted=rival), done]
-        self.accepted = [rival.key, done.accepted.key]
+        near = [
+            item for item in choice.rivals if item.key[0] in alike and self._grows(item) and item.standing.cost < most
+        ]
+        others = sorted(near, key=lambda item: item.standing.cost)[:1]
+        if len(self.accepted) > 1:
+            others += [item for item in choice.aliases if item.key[0] != held[0] and item not in others]
+        for rival in others:
+            if self._exhausted():
+                break
+            done = self._round(self.bench.at(rival.fitted), [rival.key], NONE) if self._grows(rival) else None
+            grown = None if done is None else done.accepted
+            if done is not None and grown is not None and beats(grown.fitted, self.bench.current, self.level, self.rng):
+                beaten.add(self.accepted[0])
+                choice, self.bench = with_first(choice, rival), self.bench.at(grown.fitted)
+                self.rounds = [replace(first, choice=choice, accepted=rival), done]
+                self.accepted = [rival.key, grown.key]
+                continue
+            fitted = rival.fitted if grown is None else grown.fitted
+            if beats(self.bench.current, fitted, self.level, self.rng):
+                beaten.add(rival.key)
+        told = without(choice, beaten)
+        self.rounds = [replace(item, choice=told) if item.choice is choice else item for item in self.rounds]
+
+    def _grows(self, rival: Rival) -> bool:
+        return may_grow(rival.screened.augmentation.drive, rival.key, self.bench.clues)
 
     def _left_out(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
         """Return free runs where recordings took no part, of the base model and of the current one of a bench."""

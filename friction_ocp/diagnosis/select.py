@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,6 +150,12 @@ def with_first(choice: Choice, rival: Rival) -> Choice:
     aliases = (rival, *(other for other in choice.aliases if other is not rival))
     same = (rival, *(other for other in choice.rivals if other is not rival and is_same(other, rival)))
     return replace(turned(choice, rival), aliases=aliases, same=same)
+
+
+def without(choice: Choice, beaten: Collection[tuple[str, str]]) -> Choice:
+    """Return a choice whose alias set has lost some rivals, which take part no more."""
+    aliases, same = (tuple(item for item in some if item.key not in beaten) for some in (choice.aliases, choice.same))
+    return replace(choice, aliases=aliases, same=same)
 
 
 def price(blocks: Blocks, parts: int) -> float:

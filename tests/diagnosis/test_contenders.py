@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.diagnosis.contenders import completed_rivals
+from friction_ocp.diagnosis.contenders import completed_rivals, to_refit
 from friction_ocp.diagnosis.crew import Crew, Refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
@@ -78,3 +78,25 @@ def test_what_lost_runs_promise_counts_for_nothing() -> None:
     tried = (("cogging", 2500.0, 2900.0), ("stribeck", 10.0, 700.0), ("unbalance", 10.0, 1500.0))
     assert completed(*tried, lost=True) == [["stribeck", "unbalance"], ["cogging"]]
     assert completed(*tried)[0][0] == "cogging"
+
+
+def test_what_promises_most_of_lost_runs_is_refitted() -> None:
+    """Short segments may not show it at all, beside what chance explains of them."""
+    promises = {"position_ripple": 2900.0, "torque_ripple": 2000.0, "structural_mode": 300.0, "cogging": 100.0}
+    loosely = {"position_ripple": 3.0, "torque_ripple": 4.0, "structural_mode": 100.0, "cogging": 1.0}
+    start: Any = object()
+    found = [
+        Screened(effect, "motor", gain, 0.0, (start,), Augmentation(DRIVE, {}, ())) for effect, gain in promises.items()
+    ]
+    rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
+    current = SimpleNamespace(astray=True, lost=True, leads_loosely=True, linear=SimpleNamespace(rows=rows))
+
+    def fitted_loosely(tried: list[Screened]) -> list[float]:
+        return [loosely[item.effect] for item in tried]
+
+    crew: Any = SimpleNamespace(
+        bench=SimpleNamespace(current=current), screened_loosely=lambda keys: [], fitted_loosely=fitted_loosely
+    )
+    chosen, unfitted = to_refit(crew, found, found)
+    assert {item.effect for item in chosen} == {"position_ripple", "torque_ripple", "structural_mode"}
+    assert not unfitted

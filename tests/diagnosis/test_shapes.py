@@ -92,6 +92,17 @@ def values_of(result: dict[str, Any]) -> dict[str, float]:
     return {name.rpartition(".")[2]: item["value"] for name, item in accepted["parameters"].items()}
 
 
+@pytest.mark.parametrize("breakaway", [1.15 * COULOMB, pytest.param(1.5 * COULOMB, marks=pytest.mark.slow)])
+def test_another_exponent_is_no_break_of_the_slope(breakaway: float, tmp_path: Path) -> None:
+    """A break comes nearer to such a curve than one of the usual exponent, be it down to the noise; neither stands in
+    for it, nor stays beside it, nor is as likely."""
+    plant = axis(law="stribeck", tau_s=breakaway, omega_s=20.0, delta=1.0)
+    result = diagnosed(tmp_path, plant, ["stribeck", "polyline_break"])
+    assert result["verdict"] == "explained" and not result["alias_sets"]
+    assert [item["effect"] for item in result["accepted"]] == ["stribeck"]
+    assert values_of(result)["delta"] == pytest.approx(1.0, abs=0.1)
+
+
 def lacking(period: float) -> Clues:
     """Return clues of a motor, 0.7 rad of whose angle one wave takes, that lacks a wave over its angle."""
     time = 1e-3 * np.arange(6000)
