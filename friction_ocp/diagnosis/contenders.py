@@ -22,6 +22,8 @@ BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
 joined segments, and, whatever they promise, for those of free runs that are lost."""
+OF_LOST = 6
+"""Candidates that are tried by what they promise of free runs that are lost: the order of such promises says little."""
 AS_NEAR = 0.01
 """Share of what the best completed refit leaves up to which what leaves more after a few steps is completed, too."""
 
@@ -46,7 +48,7 @@ def to_refit(
         return with_resembling(chosen, found), []
     outright = [item for item in found if item.augmentation.outright is not None]
     if current.lost:
-        first = [item for item in chosen if item.starts][:BEGUN]
+        first = [item for item in chosen if item.starts][:OF_LOST]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
         tried = _and(tried, outright)
         if not current.leads_loosely:
