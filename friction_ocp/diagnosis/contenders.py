@@ -41,7 +41,8 @@ def to_refit(
     What may be large and yet promises nothing is tried wherever a model has gone astray.
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
-    joined segments do, where both are judged by squares and the best is no work of chance.
+    joined segments do, where both are judged by squares and the best is no work of chance, but for what promises most
+    of free runs: short segments may not show it.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if not chosen or not current.astray:
@@ -53,7 +54,9 @@ def to_refit(
         tried = _and(tried, outright)
         if not current.leads_loosely:
             return tried, []
-        return _leading(tried, crew.fitted_loosely(tried), samples(current)), []
+        leading = _leading(tried, crew.fitted_loosely(tried), samples(current))
+        most = [item.key for item in first[:1]]
+        return _and(leading, [item for item in tried if item.key in most]), []
     unfitted = _promising(crew.screened_unfitted(keys))
     return _and(with_resembling(chosen, found, astray=True), outright), _and(unfitted, outright)
 
@@ -69,7 +72,7 @@ def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> l
 
     All, where none is worth its parameters there by BIC over `count` samples: what moves free runs over minutes can be
     hidden in short segments, and what is gained there is chance. And those that lose as much: the model without them
-    is one of theirs, so that their fit is no judgement of them. And what promises most of all for free runs.
+    is one of theirs, so that their fit is no judgement of them.
     """
     chance = [0.5 * len(item.augmentation.off) * np.log(count) for item in tried]
     if not any(gain > least for gain, least in zip(gains, chance, strict=True)):
@@ -77,8 +80,7 @@ def _leading(tried: Sequence[Screened], gains: Sequence[float], count: int) -> l
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     enough = MOST_ALIKE * gains[order[0]]
     leading = [tried[k] for rank, k in enumerate(order) if rank < FINISHED or gains[k] >= enough]
-    most = max(range(len(tried)), key=lambda k: tried[k].gain)
-    return _and(leading, [item for k, item in enumerate(tried) if k == most or gains[k] < -chance[k]])
+    return _and(leading, [item for k, item in enumerate(tried) if gains[k] < -chance[k]])
 
 
 def displaced(rounds: Sequence[Round], known: Mapping[Key, Screened], chosen: Sequence[Screened]) -> list[Screened]:

@@ -16,7 +16,7 @@ from plant import PlantController, Trajectory, reversing_steps
 
 from friction_ocp.diagnosis import refit
 from friction_ocp.diagnosis.bench import Bench, open_bench
-from friction_ocp.diagnosis.contenders import BEGUN, beginning_at, displaced, to_refit
+from friction_ocp.diagnosis.contenders import OF_LOST, beginning_at, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.polishing import loosely
 from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
@@ -120,10 +120,10 @@ def candidate(effect: str, *sizes: float, gain: float = 1.0) -> Screened:
 @pytest.mark.parametrize(
     ("gains", "kept"),
     [
-        ([5.0, 9.0, 1.0, 8.0, 2.0], [1, 3, 0]),
-        ([0.1, 9.0, 0.2, 0.3, 0.4], [1, 4]),
-        ([-9.0, 9.0, 5.0, 8.0, 0.4], [1, 3, 2, 0]),
-        ([1.0, 0.0, 3.0, -np.inf, 0.5], [0, 1, 2, 3, 4]),
+        ([5.0, 9.0, 1.0, 8.0, 2.0, 0.0, 0.0], [1, 3, 0]),
+        ([0.1, 9.0, 0.2, 0.3, 0.0, 0.0, 0.4], [1, 6, 0]),
+        ([0.0, -9.0, 5.0, 0.3, 0.4, 0.0, 9.0], [6, 2, 1, 0]),
+        ([1.0, 0.0, 3.0, -np.inf, 0.5, 0.0, 0.0], [0, 1, 2, 3, 4, 5, 6]),
     ],
 )
 def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with(
@@ -132,14 +132,14 @@ def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with
     """What either prediction promises is fitted there; the best two, and what gains half as much, are refitted.
 
     All are where what is gained there may be chance: less than half the logarithm of a thousand samples. What loses
-    more than that was not fitted to its end, and is refitted, too.
+    more than that was not fitted to its end, and is refitted, too; and what promises most of free runs.
     """
     large, small = candidate("cogging", 1.0, gain=3.0), candidate("load_dependence", 1.0)
-    last = [candidate("warm_up", 1.0, gain=0.5 - 0.1 * k) for k in range(BEGUN)]
+    last = [candidate("warm_up", 1.0, gain=0.5 - 0.1 * k) for k in range(OF_LOST)]
     loose = candidate("position_ripple", 1.0, gain=5.0)
     linear = SimpleNamespace(rows=SimpleNamespace(channel=np.zeros(1000), residual=np.ones(1000)))
     bench = SimpleNamespace(current=SimpleNamespace(lost=True, leads_loosely=True, astray=True, linear=linear))
-    tried = [large, small, *last[: BEGUN - 2], loose]
+    tried = [large, small, *last[: OF_LOST - 2], loose]
     assert len(tried) == len(gains)
 
     def screened_loosely(keys: list[Key]) -> list[Screened]:
