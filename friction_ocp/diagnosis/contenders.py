@@ -21,9 +21,10 @@ leads nowhere."""
 BEGUN, MOST_ALIKE = 4, 0.5
 """Candidates that are refitted from the guesses, too, and their predicted gain over the largest: parameters that a fit
 has moved far to stand in for what is missing hide what it is. As many are refitted for the predictions of loosely
-joined segments, and, whatever they promise, for those of free runs that are lost."""
+joined segments."""
 OF_LOST = 6
-"""Candidates that are tried by what they promise of free runs that are lost: the order of such promises says little."""
+"""Candidates that are tried for what they promise of free runs that are lost, whatever that is: the order of such
+promises says little."""
 AS_NEAR = 0.01
 """Share of what the best completed refit leaves up to which what leaves more after a few steps is completed, too."""
 

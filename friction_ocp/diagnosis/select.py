@@ -153,9 +153,14 @@ def with_first(choice: Choice, rival: Rival) -> Choice:
 
 
 def without(choice: Choice, beaten: Collection[tuple[str, str]]) -> Choice:
-    """Return a choice whose alias set has lost some rivals, which take part no more."""
+    """Return a choice in which some rivals take part no more; their chances are the first's."""
+    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
+    freed = sum(chances.pop(key) for key in {*beaten} & {*chances})
+    first = choice.rivals[0].key
+    chances[first] = chances.get(first, 0.0) + freed
     aliases, same = (tuple(item for item in some if item.key not in beaten) for some in (choice.aliases, choice.same))
-    return replace(choice, aliases=aliases, same=same)
+    found = tuple(chances.get(item.key, 0.0) for item in choice.rivals)
+    return replace(choice, probabilities=found, aliases=aliases, same=same)
 
 
 def price(blocks: Blocks, parts: int) -> float:
