@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import group_inertias
 from friction_ocp.diagnosis.linear import LinearRecording
-from friction_ocp.drive.mechanism import Mechanism, column
+from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.stepping import state_symbols
@@ -35,6 +35,8 @@ MISSED = 0.1
 LARGER = 3
 """Times that it grows to what was found with less."""
 
+_Watch = Callable[[Experiment, FloatArray, IntArray], dict[str, FloatArray]]
+
 _known: WeakKeyDictionary[FittedModel, Clues] = WeakKeyDictionary()
 
 
@@ -47,24 +49,20 @@ def clues_of(fitted: FittedModel) -> Clues:
 
 @once
 def _clues_of(fitted: FittedModel) -> Clues:
-    mech = fitted.model.drive.mechanism
-    watch, names = _watch(mech)
-    tables = [_table(fitted, index, watch, names) for index in range(len(fitted.linear.recordings))]
+    watch = _watch(fitted)
+    tables = [_table(fitted, index, watch) for index in range(len(fitted.linear.recordings))]
     by_path = fitted.model.space.numbers_by_path(fitted.theta, fitted.model.train[0].name)
     typical = _typical_torques(fitted, tables, by_path)
-    tracks = tuple(
-        _track(fitted, *parts) for parts in zip(tables, *_torques(fitted, watch, names, typical), strict=True)
-    )
+    missing = _torques(fitted, watch, typical)
+    tracks = tuple(_track(fitted, *parts) for parts in zip(tables, *missing, strict=True))
     return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path))
 
 
-def _torques(
-    fitted: FittedModel, watch: ca.Function, names: list[str], typical: Mapping[str, float]
-) -> tuple[list[Missing], list[Missing]]:
+def _torques(fitted: FittedModel, watch: _Watch, typical: Mapping[str, float]) -> tuple[list[Missing], list[Missing]]:
     """Return what torque is missing in every recording, over the segments of the fit and over a few samples each."""
 
     def pulled(samples: int, size: Mapping[str, float]) -> list[Missing]:
-        return [_missing(fitted, item, watch, names) for item in _smoothers(fitted, samples, size)]
+        return [_missing(fitted, item, watch) for item in _smoothers(fitted, samples, size)]
 
     items = fitted.linear.program.experiments
     fine = max(FINE, max(item.grid.time.size for item in items) // MOST_FINE)
@@ -78,7 +76,7 @@ def _torques(
         finely = pulled(fine, size)
     if fitted.footing.segment_s is None:
         return pulled(fitted.model.problem.estimation.samples, size), finely
-    return [_missing(fitted, item, watch, names) for item in fitted.linear.recordings], finely
+    return [_missing(fitted, item, watch) for item in fitted.linear.recordings], finely
 
 
 def _rms(parts: Sequence[FloatArray]) -> float:
@@ -101,8 +99,9 @@ def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[st
     return found
 
 
-def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
-    """Return (x, u, p) -> motions of all shafts and torques of all motors, and their names."""
+def _watch(fitted: FittedModel) -> _Watch:
+    """Return (recording, (n, states), (n,) nodes of its grid) -> (n,) motions of shafts and torques of motors."""
+    mech = fitted.model.drive.mechanism
     state = state_symbols(mech)
     at = state.motion(mech)
     shafts, motors = mech.drive.shafts, mech.drive.motors
@@ -112,7 +111,14 @@ def _watch(mech: Mechanism) -> tuple[ca.Function, list[str]]:
     names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
     names += [f"{motor.name}.torque" for motor in motors]
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
-    return ca.Function("watch", [state.x, u, p], [column(values)]), names
+    function = ca.Function("watch", [state.x, u, p], [column(values)])
+
+    def watch(item: Experiment, states: FloatArray, nodes: IntArray) -> dict[str, FloatArray]:
+        numbers = fitted.model.space.numbers(fitted.theta, item.name)
+        seen = np.asarray(function.map(nodes.size)(states.T, item.grid.at_node[nodes].T, numbers))
+        return {name: seen[k] for k, name in enumerate(names)}
+
+    return watch
 
 
 def states_along(fitted: FittedModel, index: int) -> FloatArray:
@@ -122,20 +128,11 @@ def states_along(fitted: FittedModel, index: int) -> FloatArray:
     return result.states
 
 
-def _table(fitted: FittedModel, index: int, watch: ca.Function, names: list[str]) -> dict[str, FloatArray]:
+def _table(fitted: FittedModel, index: int, watch: _Watch) -> dict[str, FloatArray]:
     """Return (n,) time, motions of all shafts and torques of all motors along a recording, by name."""
     item = fitted.linear.program.experiments[index]
-    seen = _seen(fitted, item, watch, names, states_along(fitted, index), np.arange(item.grid.time.size))
+    seen = watch(item, states_along(fitted, index), np.arange(item.grid.time.size))
     return {"time": item.grid.time, **seen}
-
-
-def _seen(
-    fitted: FittedModel, item: Experiment, watch: ca.Function, names: list[str], states: FloatArray, at: IntArray
-) -> dict[str, FloatArray]:
-    """Return (n,) what is watched in (n, states) states at (n,) nodes of the grid of a recording, by name."""
-    numbers = fitted.model.space.numbers(fitted.theta, item.name)
-    seen = np.asarray(watch.map(at.size)(states.T, item.grid.at_node[at].T, numbers))
-    return {name: seen[k] for k, name in enumerate(names)}
 
 
 def _track(fitted: FittedModel, table: Mapping[str, FloatArray], missing: Missing, finely: Missing) -> Track:
@@ -148,7 +145,7 @@ def _of(drive: Drive, table: Mapping[str, FloatArray], kind: str) -> dict[str, F
     return {shaft.name: table[f"{shaft.name}.{kind}"] for shaft in drive.shafts}
 
 
-def _missing(fitted: FittedModel, smoother: LinearRecording, watch: ca.Function, names: list[str]) -> Missing:
+def _missing(fitted: FittedModel, smoother: LinearRecording, watch: _Watch) -> Missing:
     """Return the mean torque that would close the gap behind each segment, and the motion with all these torques."""
     mech, first = fitted.model.drive.mechanism, smoother.cut.first
     middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
@@ -165,7 +162,7 @@ def _missing(fitted: FittedModel, smoother: LinearRecording, watch: ca.Function,
             ratio = speed_ratio(mech, fitted.footing.numbers[name], shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
         missing[shaft.name] = torque
-    nodes = _seen(fitted, smoother.item, watch, names, smoother.nodes, first[:-1])
+    nodes = watch(smoother.item, smoother.nodes, first[:-1])
     motion = {name: 0.5 * (values[1:] + values[:-1]) for name, values in nodes.items()}
     return Missing(middle, missing, _of(mech.drive, motion, "theta"), _of(mech.drive, motion, "omega"))
 

@@ -16,7 +16,6 @@ from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
 from friction_ocp.drive.parts import Channel, Drive
-from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
@@ -67,17 +66,13 @@ def _begun_at(known: FittedModel, model: Model, foot: Footing, theta: FloatArray
 
     Where that comes to less than what is known, from where the parameters say that segments begin, too.
     """
-    nodes = known.linear.point.nodes if _shapes(model, foot) == _shapes(known.model, known.footing) else None
+    shapes = [(cut.count, len(model.drive.state_names)) for cut in foot.training(model).segments]
+    nodes = known.linear.point.nodes
+    nodes = nodes if shapes == [one.shape for one in nodes] else None
     end = polished(model, foot, theta, nodes)
     if nodes is not None and not end.objective <= known.objective:
         end = min(end, polished(model, foot, theta, None), key=lambda one: one.objective)
     return end
-
-
-def _shapes(model: Model, foot: Footing) -> list[tuple[int, int]]:
-    """Return how many segments each recording has, and how many states."""
-    states = int(state_symbols(model.drive.mechanism).x.numel())
-    return [(cut.count, states) for cut in foot.training(model).segments]
 
 
 def explains_more(

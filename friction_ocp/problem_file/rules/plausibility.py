@@ -85,14 +85,16 @@ def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
     """What two sensors see of shafts that are joined differs by the stated ratio."""
     seeing = [channel for channel in case.drive.channels if channel.signal in ("theta", "omega")]
     for first, second in combinations(seeing, 2):
-        factors = [factor for _, use in case.uses() if (factor := _factor(case, first, second, use)) is not None]
+        known = case.ratio(first.part, second.part)
+        if known is None:
+            continue
+        found = [_factor(case, first, second, known, use) for _, use in case.uses()]
+        factors = [factor for factor in found if factor is not None]
         if not factors:
             continue
         factor = float(np.median(factors))
         if 1.0 / _RATIO_SLIP <= factor <= _RATIO_SLIP:
             continue
-        known = case.ratio(first.part, second.part)
-        assert known is not None, "or no factor would be known"
         expected = "the ratios in the file say" if first.part != second.part else "one shaft has it"
         seen, stated = f"{factor / known:.3g} times as far as '{first.name}'", f"{1.0 / known:.3g} times as {expected}"
         what = f"'{second.name}' moves {seen}, not {stated}"
@@ -101,12 +103,11 @@ def sensors_of_one_motion_agree(case: Case) -> Iterator[Finding]:
         yield Finding(case.at(f"channels.{second.name}"), what, allowed, remedy, "warning")
 
 
-def _factor(case: Case, first: Channel, second: Channel, use: RecordingUse) -> float | None:
+def _factor(case: Case, first: Channel, second: Channel, ratio: float, use: RecordingUse) -> float | None:
     """Return the speed that one sensor shows over what another and the ratio say; None where they see no one motion."""
-    ratio = case.ratio(first.part, second.part)
-    moved = None if ratio is None else case.seen_by(first, use)
+    moved = case.seen_by(first, use)
     shown = None if moved is None else case.seen_by(second, use)
-    if ratio is None or moved is None or shown is None:
+    if moved is None or shown is None:
         return None
     known = _at(moved.through(1.0 / ratio), shown.time)
     power = float(known @ known), float(shown.omega @ shown.omega)
