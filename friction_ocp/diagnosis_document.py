@@ -48,6 +48,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "rounds": _rounds(diagnosis, diagnosis.rounds),
         "superseded": _rounds(diagnosis, diagnosis.superseded),
         "alias_sets": [[_named(key) for key in keys] for keys in diagnosis.alias_sets],
+        "as_near": [[_named(key) for key in keys] for keys in diagnosis.as_near],
         "same_as": [[_named(key) for key in keys] for keys in diagnosis.same],
         "cannot_tell": [_blind_spot(item, problem.drive) for item in diagnosis.blind],
         "accepted": [{**_explained(key), "parameters": _added(diagnosis, key)} for key in diagnosis.accepted],

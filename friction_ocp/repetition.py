@@ -45,6 +45,7 @@ COMPARED = (
     "compare",
     "accepted",
     "alias_sets",
+    "as_near",
     "gap",
     "biased_parameters",
     "machines",

@@ -110,10 +110,20 @@ class Diagnosis:
 
     @property
     def alias_sets(self) -> tuple[tuple[Key, ...], ...]:
-        """Sets of candidates that the recordings cannot tell apart, the accepted one first.
+        """Sets of candidates that the recordings cannot tell apart, the accepted one first, where noise is left."""
+        return () if self.unexplained else self._sets
 
-        What was accepted in another round is there besides, not instead.
+    @property
+    def as_near(self) -> tuple[tuple[Key, ...], ...]:
+        """Sets of candidates that come as near to the recordings, the accepted one first, where something is left.
+
+        No alias sets: the cause need not be among them.
         """
+        return self._sets if self.unexplained else ()
+
+    @cached_property
+    def _sets(self) -> tuple[tuple[Key, ...], ...]:
+        """Sets of candidates within the noise of one another; what was accepted elsewhere is there besides."""
         sets = [[rival.key for rival in shown(item.choice.aliases)] for item in self._decided]
         left = [(keys[0], *(key for key in keys[1:] if key not in self.accepted)) for keys in sets if keys]
         return tuple(keys for keys in left if len(keys) > 1)
@@ -230,9 +240,9 @@ def _checked(
             again = begun_again(current, base.model.space)
             if again.objective < current.objective - UNIMPORTANT:
                 current, power, found = again, innovations(again), contradictions(again)
-        if not found:
+        choice = corrected(current, found, meant) if found else None
+        if choice is None:
             break
-        fitted, choice = corrected(current, found, meant)
         rounds.append(Round((), choice, current, power, choice.rivals[0]))
-        current = fitted
+        current = choice.rivals[0].fitted
     return current, rounds

@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished, tim
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Choice, Round, choose, gave_shape, resamples, schwarz, turned
+from friction_ocp.diagnosis.select import Round, choose, gave_shape, resamples, schwarz, turned
 from friction_ocp.diagnosis.worth import OF_ALL, Key, may_grow, required, samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import with_drive
@@ -104,7 +104,7 @@ def exchanged(
     for index, item in enumerate(done[:-1]):
         held = item.accepted
         if held is not None and _is_open(done, index, accepted):
-            for rival in _others(bench, item.choice, accepted):
+            for rival in _others(bench, item, accepted):
                 keys = _swapped(accepted, held.key, rival.key)
                 wanted[held.key, rival.key] = _Wanted(keys, rival.standing.values)
     known = _fits(bench, run, wanted)
@@ -113,7 +113,7 @@ def exchanged(
         if held is None or not _is_open(done, index, accepted):
             continue
         seen, tried, made = set[Key](), list[Rival](), {held.key: accepted}
-        others = _others(bench, item.choice, accepted)
+        others = _others(bench, item, accepted)
         while others:
             rival = others.pop(0)
             seen.add(rival.key)
@@ -131,7 +131,7 @@ def exchanged(
                 held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
                 item = replace(item, accepted=rival, choice=turned(item.choice, rival))
                 tried = [other.refitted(other.fitted, -benchmark.dearer(other.fitted)) for other in former]
-                others = _others(bench, item.choice, accepted, seen)
+                others = _others(bench, item, accepted, seen)
             else:
                 tried.append(rival.refitted(swapped, gains))
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
@@ -214,18 +214,24 @@ def fit_instead(bench: Bench, keys: Sequence[Key], alone: Mapping[str, float] | 
     return point_document(fitted) if fitted.holds else None
 
 
-def _others(bench: Bench, choice: Choice, accepted: Sequence[Key], seen: Collection[Key] = ()) -> list[Rival]:
-    """Return the rivals of a round to be tried in the place of what it has found, the best first.
+def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection[Key] = ()) -> list[Rival]:
+    """Return the rivals of a round to be tried in the place of what it has found.
 
-    One that was accepted since may do the work of both, in a more general shape.
+    Those that came nearest, and those that took half as much with fewer parameters: what they lacked may be what was
+    found later. One that was accepted since may do the work of both, in a more general shape.
     """
 
     def open_to(key: Key) -> bool:
         times = accepted.count(key)
         return times == 0 or (times == 1 and may_grow(_drive(bench, [key]), key, clues_of(bench.base)))
 
-    others = [rival for rival in choice.rivals if rival.key not in seen and open_to(rival.key)]
-    return sorted(others, key=lambda rival: rival.standing.cost)[:TRIED]
+    others = [rival for rival in item.choice.rivals if rival.key not in seen and open_to(rival.key)]
+    others = sorted(others, key=lambda rival: rival.standing.cost)
+    assert item.accepted is not None
+    held = item.accepted.standing
+    most = (1.0 - MOST_OF) * item.before.cost + MOST_OF * held.cost
+    simpler = [rival for rival in others[TRIED:] if rival.standing.determined < held.determined]
+    return others[:TRIED] + [rival for rival in simpler if rival.standing.cost <= most][:TRIED]
 
 
 def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:

@@ -11,7 +11,7 @@ from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
-from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.excess import DOUBTED, excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, carries_over
 from friction_ocp.diagnosis.held_out import folds
@@ -50,6 +50,8 @@ PART = 0.25
 """Share of the gap below which additions that leave more than noise are taken back: less than that was a stand-in for
 something outside the catalogue in all 3 cases of the blind suite of seed 20261130. On real machines, where something is
 always left, half of the gap may be all that the largest effect explains."""
+INSTEAD = 2
+"""Other effects, nearest first, from which the search goes on where the first addition leads nowhere."""
 NOTABLE_REST = 0.25
 """Share that is left of free runs' gap above which something further is looked for."""
 HOPE = 0.25
@@ -140,7 +142,7 @@ class Search:
 
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""
-        for way in (self._from_better, self._from_alias, self._reopened):
+        for way in (self._from_better, self._from_alias, self._reopened, self._from_rival):
             done = None if not self.accepted or self._exhausted() else way()
             if done is not None:
                 return done
@@ -184,6 +186,30 @@ class Search:
             if done.accepted is not None:
                 self.rounds[-1] = replace(last, choice=with_first(last.choice, rival), accepted=rival)
                 self.bench, self.accepted = bench, keys
+                return done
+        return None
+
+    def _from_rival(self) -> Round | None:
+        """Go on from other effects in the place of the only addition, where with the next one they lead further.
+
+        What comes nearest to two effects that are missing may be neither, and leave nothing that could be told.
+        """
+        if len(self.rounds) != 1 or self.bench.current.astray:
+            return None
+        (first,), current = self.rounds, self.bench.current
+        held, enough = first.accepted, required(self.bench.base, current)
+        if held is None:
+            return None
+        tried = {item.key for item in shown(first.choice.aliases)}
+        others = [item for item in first.choice.rivals if item.key[0] != held.key[0] and item.key not in tried]
+        for rival in sorted(others, key=lambda item: item.standing.cost)[:INSTEAD]:
+            if self._exhausted():
+                break
+            bench = self.bench.at(rival.fitted)
+            done = self._round(bench, [rival.key], self.meant)
+            if done.accepted is not None and current.cost - done.accepted.standing.cost >= enough:
+                self.rounds = [replace(first, choice=with_first(first.choice, rival), accepted=rival)]
+                self.bench, self.accepted = bench, [rival.key]
                 return done
         return None
 
@@ -310,16 +336,17 @@ class Search:
         self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(first)], []
 
     def _helps(self, bench: Bench) -> bool:
-        """Whether what was added leaves nothing, or takes a part and makes free runs of training recordings left out
-        better.
+        """Whether what was added takes a part, and makes free runs of training recordings left out better.
 
         Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
         runs that are lost say nothing, and against what takes almost all they say no more than that something else is
-        missing.
+        missing. Where no more than noise is left a part of what they show has to go, too: nothing else is missing then.
         """
         base, current = bench.base, bench.current
         if not innovations(current).significant(self.level):
-            return True
+            before, after = self._left_out(bench)
+            left = max(DOUBTED - 1.0, (1.0 - PART) * before.excess())
+            return before.lost or after.drowned or after.excess() <= left
         taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
         if taken < PART * whole:
             return False

@@ -50,7 +50,7 @@ class Contradiction:
 
 
 def contradictions(fitted: FittedModel) -> list[Contradiction]:
-    """Return what lies beyond the limit in a fitted model, the farthest first."""
+    """Return what lies beyond the limit in a fitted model, the farthest first, meant to compete or not."""
     space = fitted.model.space
     distance = _distance(fitted)
     drive = fitted.model.problem.drive
@@ -113,8 +113,10 @@ def _key(path: str, drive: Drive) -> tuple[str, str]:
     return ("inertia_error" if rest == "inertia" else "parameter_error"), part
 
 
-def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Considered) -> tuple[FittedModel, Choice]:
-    """Fit again with the stated values of one part taken back, the one that leaves least; return fit and choice.
+def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Considered) -> Choice | None:
+    """Fit again with the stated values of one part taken back; return the parts, the one that leaves least first.
+
+    Whatever competes, or where the problem names such effects only what it names: None where that is no part of those.
 
     It is a part whose fitted values are far from what is stated for them, or one whose values are fixed: fitted ones
     may have given way to it. Every value that is taken back costs what Schwarz 1978 asks for.
@@ -122,16 +124,19 @@ def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Consi
     blocks = current.blocks
     each, without = schwarz(blocks), blocks.sums(held_out(current))
     best = dict[Key, tuple[float, Rival]]()
-    for count, seen, fitted in [*_released(current, found), *_freed(current, found, meant)]:
+    narrowed = not set(STATED).isdisjoint(meant.names)
+    released = [item for item in found if not narrowed or meant.holds(item.effect, item.component)]
+    for count, seen, fitted in [*_released(current, released), *_freed(current, found, meant)]:
         gains = without - blocks_like(current, fitted, blocks)
         score = fitted.cost + count * each
         if seen.key not in best or score < best[seen.key][0]:
             best[seen.key] = score, Rival.of(seen, fitted, gains)
+    if not best:
+        return None
     scores, ordered = zip(*sorted(best.values(), key=lambda pair: pair[0]), strict=True)
     weights = np.exp(scores[0] - np.array([*scores, max(current.cost, scores[0])]))
     *chances, nothing = map(float, weights / weights.sum())
-    choice = Choice(ordered, tuple(chances), nothing, True, ordered[: needed(chances)], ordered[:1])
-    return ordered[0].fitted, choice
+    return Choice(ordered, tuple(chances), nothing, True, ordered[: needed(chances)], ordered[:1])
 
 
 def _released(current: FittedModel, found: Sequence[Contradiction]) -> Iterator[tuple[int, Screened, FittedModel]]:

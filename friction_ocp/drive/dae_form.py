@@ -15,7 +15,7 @@ from friction_ocp.dae import Dae, Variable
 from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds
 from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
-from friction_ocp.drive.kick import motor_loads, through_joint, transmitted_torque
+from friction_ocp.drive.kick import losses, motor_loads, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import extra_rates, lag_rates
 from friction_ocp.drive.parts import Drive
@@ -40,6 +40,7 @@ class _Symbols:
     extra: ca.SX
     lagged: ca.SX
     loops: ca.SX
+    warmth: ca.SX
     memory: ca.SX
     torques: ca.SX
     """(joints,) torques through rigid joints that friction depends on: the algebraic variables."""
@@ -47,7 +48,7 @@ class _Symbols:
     @property
     def parts(self) -> tuple[ca.SX, ...]:
         """The states by their kind."""
-        return self.angles, self.speeds, self.bristle, self.extra, self.lagged, self.loops
+        return self.angles, self.speeds, self.bristle, self.extra, self.lagged, self.loops, self.warmth
 
     @property
     def x(self) -> list[ca.SX]:
@@ -68,7 +69,7 @@ def dae(drive: Drive, width: float) -> Dae:
     mech = mechanism(drive)
     symbols = _symbols(mech)
     groups = group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds)
-    at = Motion(*groups, symbols.extra, symbols.memory, symbols.lagged, symbols.loops)
+    at = Motion(*groups, symbols.extra, symbols.memory, symbols.lagged, symbols.loops, symbols.warmth)
     torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
@@ -89,7 +90,8 @@ def dae(drive: Drive, width: float) -> Dae:
             for channel, value in zip(mech.drive.outputs, outputs, strict=True)
         ),
         ode=ca.vertcat(
-            column([*turning, *speeding, *rates]), extra_rates(mech, at), lag_rates(mech, at), loop_rates(mech, at)
+            *(column([*turning, *speeding, *rates]), extra_rates(mech, at), lag_rates(mech, at), loop_rates(mech, at)),
+            _warmth_rates(mech, symbols, at, load),
         ),
         alg=symbols.torques - found,
     )
@@ -98,13 +100,14 @@ def dae(drive: Drive, width: float) -> Dae:
 def _symbols(mech: Mechanism) -> _Symbols:
     counts = (
         *(mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names),
-        *(mech.lagging, mech.looping),
+        *(mech.lagging, mech.looping, mech.warming),
     )
     names = iter(mech.state_names)
-    angles, speeds, bristle, extra, lagged, loops = (column([symbol(next(names)) for _ in part]) for part in counts)
+    angles, speeds, bristle, *others = (column([symbol(next(names)) for _ in part]) for part in counts)
+    extra, lagged, loops, warmth = others
     memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
     joints = column([symbol(f"{joint.name}.torque") for joint in mech.loaded_joints()])
-    return _Symbols(angles, speeds, bristle, extra, lagged, loops, memory, joints)
+    return _Symbols(angles, speeds, bristle, extra, lagged, loops, warmth, memory, joints)
 
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
@@ -132,6 +135,14 @@ def _friction(
     return friction, rates
 
 
+def _warmth_rates(mech: Mechanism, symbols: _Symbols, at: Motion, load: dict[str, Any]) -> ca.SX:
+    rates: list[Any] = []
+    for k, (shaft, loss) in enumerate(losses(mech, at, load)):
+        assert shaft.friction.warm_up is not None
+        rates.append(shaft.friction.warm_up.rate(symbols.warmth[k], loss))
+    return column(rates)
+
+
 def _acceleration(mech: Mechanism, at: Motion, group: int, torques: dict[str, Any], friction: dict[str, Any]) -> Any:
     """Return the acceleration of a group; 0 where its motion is an input."""
     if group in mech.prescribed:
@@ -151,6 +162,8 @@ def _state_unit(mech: Mechanism, name: str) -> str:
         return command_unit(drive, drive.controller)
     if signal == "lagged":
         return signal_unit(drive, f"{part}.{mech.driving_signal(drive.motor(part))}")
+    if signal == "friction.warmth":
+        return si_unit("dimensionless")
     if signal == "hysteresis.z":
         part = next(item.to_shaft for item in mech.looping if item.name == part)
     deflected = signal == "hysteresis.z" or signal.startswith("friction.z")

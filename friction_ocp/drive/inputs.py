@@ -71,8 +71,12 @@ def warm_up_faults(drive: Drive) -> Iterator[Finding]:
             what = "friction depends on the temperature, which no input channel measures"
             remedy = "add a channel with measures: temperature, or leave per_kelvin out"
             yield Finding(f"{where}.per_kelvin", what, "0 without it", remedy)
-        if not is_off(warm_up.amplitude) and warm_up.time_constant is None:
+        if is_off(warm_up.amplitude):
+            continue
+        if warm_up.time_constant is None:
             yield Finding(f"{where}.time_constant", "this key is missing", "s, in which the amplitude is approached")
+        if not is_off(warm_up.loss_share) and warm_up.power is None:
+            yield Finding(f"{where}.power", "this key is missing", "W lost in friction that warm it by the amplitude")
 
 
 def moved_from_behind(drive: Drive, structure: Topology) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ starts anew, so that the order 2 holds across events too. Related: Moreau 1988 (
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -141,6 +142,14 @@ def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> A
         for joint in mech.load_joints(shaft)
     ] or [load[motor.name] for motor in mech.motors_on(shaft)]
     return smooth_abs(sum(torques[1:], torques[0]))
+
+
+def losses(mech: Mechanism, motion: Motion, load: dict[str, Any]) -> Iterator[tuple[Shaft, Any]]:
+    """Yield the shafts that their friction's losses warm, and what is lost there at steady speed, W."""
+    for shaft in mech.warming:
+        omega = mech.shaft_speed(shaft.name, motion)
+        element = shaft.friction.under(mech.surroundings(shaft, motion))
+        yield shaft, omega * element.torque(omega, transmitted_torque(mech, shaft, load))
 
 
 def _solve(

@@ -60,6 +60,8 @@ class Motion:
     """What drives the motors that lag behind their commands."""
     loops: ca.SX | None = None
     """Deflections of the loops of transmissions at the start of the step; None leaves loops out."""
+    warmth: ca.SX | None = None
+    """How far the friction of shafts that their losses warm has settled; None is as far as time alone says."""
     h: Any = None
     """Length of the step over which torques are averaged, s; None at an instant."""
     steady: ca.SX | None = None
@@ -125,13 +127,19 @@ class Mechanism:
         return tuple(item for item in self.topology.elastic if item.hysteresis is not None)
 
     @property
+    def warming(self) -> tuple[Shaft, ...]:
+        """Shafts whose friction is warmed by its own losses."""
+        parts = ((shaft, shaft.friction.warm_up) for shaft in self.drive.shafts)
+        return tuple(shaft for shaft, warm_up in parts if warm_up is not None and warm_up.by_losses)
+
+    @property
     def memory_names(self) -> tuple[str, ...]:
         """Names of the states of a sampled controller."""
         return () if self.drive.controller is None else memory_names(self.drive.controller)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of all states in order: angles, speeds, bristles, currents and integrals, lags, loops, memory."""
+        """Names of all states: angles, speeds, bristles, currents and integrals, lags, loops, warmth, memory."""
         roots = self.topology.roots
         return (
             *(f"{roots[g]}.theta" for g in self.angle_groups),
@@ -140,6 +148,7 @@ class Mechanism:
             *self.extra_names,
             *(f"{motor.name}.lagged" for motor in self.lagging),
             *(f"{item.name}.hysteresis.z" for item in self.looping),
+            *(f"{shaft.name}.friction.warmth" for shaft in self.warming),
             *self.memory_names,
         )
 
@@ -234,7 +243,9 @@ class Mechanism:
     def surroundings(self, shaft: Shaft, motion: Motion) -> Surroundings:
         """Return what the friction of a shaft depends on beside speed and load."""
         theta, passed = self.angle_passed(shaft.name, motion)
-        return Surroundings(theta, passed, self.inputs.get(TIME, 0.0), self.true_input("temperature"))
+        warm = [item.name for item in self.warming]
+        warmth = motion.warmth[warm.index(shaft.name)] if motion.warmth is not None and shaft.name in warm else None
+        return Surroundings(theta, passed, self.inputs.get(TIME, 0.0), self.true_input("temperature"), warmth)
 
     def inertia(self, group: int, motion: Motion | None = None) -> Any:
         """Return the inertia of a group, referred to its first shaft; without a motion that of the mean ratios."""

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.coordinates import pick, prescribed_motion
+from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, deflection_names
 from friction_ocp.drive.motors import commands, seen_by_controller
 from friction_ocp.drive.parts import Channel, Shaft
@@ -32,8 +33,15 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         at.extra,
         lagged,
         ca.SX.zeros(len(mech.looping)),
+        column([_warmth(mech, shaft) for shaft in mech.warming]),
         column(memory),
     )
+
+
+def _warmth(mech: Mechanism, shaft: Shaft) -> Any:
+    """Return how far friction has settled since the start of the recording under the losses that it settles at."""
+    assert shaft.friction.warm_up is not None
+    return shaft.friction.warm_up.risen(mech.inputs[TIME])
 
 
 def unseen_states(mech: Mechanism) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from friction_ocp.drive.control import apply_tick, compute_tick
 from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds, pick
 from friction_ocp.drive.holding import drive_torque, holding_effort, holding_torques
 from friction_ocp.drive.inputs import TIME
-from friction_ocp.drive.kick import Step, Unknown, implicit_kick, transmitted_torque
+from friction_ocp.drive.kick import Step, Unknown, implicit_kick, losses, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import (
     commands,
@@ -84,11 +84,12 @@ class State:
     extra: ca.SX
     lagged: ca.SX
     loops: ca.SX
+    warmth: ca.SX
     memory: ca.SX
 
     def at(self, q: ca.SX, v: ca.SX) -> Motion:
         """Return the motion at an instant, the groups being at `q` with speeds `v`."""
-        return Motion(q, v, self.extra, self.memory, self.lagged, self.loops)
+        return Motion(q, v, self.extra, self.memory, self.lagged, self.loops, self.warmth)
 
     def motion(self, mech: Mechanism) -> Motion:
         """Return the motion of a drive in this state."""
@@ -104,6 +105,7 @@ def state_symbols(mech: Mechanism) -> State:
         len(mech.extra_names),
         len(mech.lagging),
         len(mech.looping),
+        len(mech.warming),
         len(mech.memory_names),
     )
     parts = [ca.SX.sym(f"x{k}", size) for k, size in enumerate(sizes)]
@@ -115,7 +117,7 @@ def _passes(mech: Mechanism) -> int:
     controller = mech.drive.controller
     loop = bool(mech.lagging) and controller is not None and controller.sample_time is None
     varying = any(mech.has_varying_ratios(group) for group in range(len(mech.topology.roots)))
-    coupled = mech.topology.elastic or mech.bristles or mech.extra_names
+    coupled = mech.topology.elastic or mech.bristles or mech.extra_names or mech.warming
     return 2 if coupled or loop or varying else 1
 
 
@@ -147,7 +149,7 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
     v1, load = v0, dict[str, Any]()
     at: Motion = replace(state.at(group_angles(mech, free_angles), v0), h=h, steady=v0)
     lagged_mean, lagged_after = _advance_lags(mech, state, at)
-    extra_after, at = state.extra, replace(at, lagged=lagged_mean)
+    extra_after, warmth_after, at = state.extra, state.warmth, replace(at, lagged=lagged_mean)
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
         # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
@@ -159,8 +161,10 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
         unknowns += [] if done.unknown is None else [done.unknown]
         at = replace(at, v=done.mean, steady=done.mean)
         extra_after = _advance_extra(mech, state, replace(at, extra=state.extra), h)
+        warmth_after = _advance_warmth(mech, state, at, load)
         lagged_mean, lagged_after = _advance_lags(mech, state, at)
-        at = replace(at, extra=0.5 * (state.extra + extra_after), lagged=lagged_mean)
+        warmth_mean = 0.5 * (state.warmth + warmth_after)
+        at = replace(at, extra=0.5 * (state.extra + extra_after), lagged=lagged_mean, warmth=warmth_mean)
     value = ca.vertcat(
         state.angles + h * pick(at.v, mech.angle_groups),
         pick(v1, mech.free_groups),
@@ -168,6 +172,7 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
         extra_after,
         lagged_after,
         loops_after(mech, at),
+        warmth_after,
         state.memory,
     )
     return _Expression(value, tuple(unknowns))
@@ -202,6 +207,15 @@ def _advance_bristles(mech: Mechanism, state: State, at: Motion, load: dict[str,
         transmitted = transmitted_torque(mech, shaft, load)
         friction = shaft.friction.under(mech.surroundings(shaft, at))
         after.append(friction.advance(at.h, omega, omega, bristle[shaft.name], transmitted))
+    return column(after)
+
+
+def _advance_warmth(mech: Mechanism, state: State, at: Motion, load: dict[str, Any]) -> ca.SX:
+    """Return how far friction has settled after a step at its mean speeds, which `at` has."""
+    after: list[Any] = []
+    for k, (shaft, loss) in enumerate(losses(mech, at, load)):
+        assert shaft.friction.warm_up is not None
+        after.append(shaft.friction.warm_up.after(at.h, state.warmth[k], loss))
     return column(after)
 
 
@@ -308,7 +322,7 @@ def _tick(mech: Mechanism, state: State, kind: ca.SX) -> ca.SX:
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
     computed, applied = compute_tick(controller, seen_by_controller(mech, at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
-    kept = (state.angles, state.speeds, state.bristle, state.extra, state.lagged, state.loops)
+    kept = (state.angles, state.speeds, state.bristle, state.extra, state.lagged, state.loops, state.warmth)
     return ca.vertcat(*kept, column(chosen))
 
 

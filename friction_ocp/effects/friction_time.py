@@ -6,23 +6,26 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import ClassVar
 
-from friction_ocp.drive.parts import Drive
+import numpy as np
+
+from friction_ocp.drive.parts import Drive, Shaft
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
 from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.friction.composite import plain_law, viscous_part
 from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
-from friction_ocp.parameters import Free
+from friction_ocp.parameters import Free, bind
 
 
 class WarmUpEffect(AbstractEffect):
-    """Friction drifts with time, or with the temperature where it is recorded.
+    """Friction drifts with time or with what it loses, or with the temperature where that is recorded.
 
-    With time the viscous part need not drift as the dry part does: a lubricant gets thin before a contact gets smooth.
+    Without a temperature the viscous part need not drift as the dry part does: a lubricant gets thin before a contact
+    gets smooth; and what warms it are its own losses, something else, or both.
     """
 
     name: ClassVar[str] = "warm_up"
-    sentence: ClassVar[str] = "friction drifts with time or temperature"
+    sentence: ClassVar[str] = "friction drifts with time, its own losses or temperature"
 
     def places(self, drive: Drive) -> Iterable[str]:
         for shaft in moving_shafts(drive):
@@ -38,12 +41,28 @@ class WarmUpEffect(AbstractEffect):
             longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
             times = [0.1 * longest, 0.3 * longest, longest]
             sizes = {f"{path}.amplitude": -0.05}
-            part = WarmUp(amplitude=Free(-0.1, -0.95, 5.0), time_constant=Free(times[1], 0.01 * longest, 100 * longest))
+            part = WarmUp(
+                amplitude=Free(-0.1, -0.95, 5.0),
+                time_constant=Free(times[1], 0.01 * longest, 100 * longest),
+                loss_share=Free(0.5, 0.0, 1.0),
+                power=_typical_loss(shaft, clues),
+            )
             if is_dry(shaft) and viscous_part(shaft.friction.law) is not None:
                 part = replace(part, viscous_excess=Free(0.0, -1.0, 5.0))
                 sizes[f"{path}.viscous_excess"] = -0.05
             off = dict.fromkeys(sizes, 0.0)
             amplitudes = tuple({name: size} for name, size in sizes.items())
-            trials = tuple(Trial(amplitudes, {f"{path}.time_constant": one}) for one in times)
+            trials = tuple(
+                Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share})
+                for one in times
+                for share in (0.0, 1.0)
+            )
         element = replace(shaft.friction, warm_up=part)
         return Augmentation(change_shaft(drive, place, friction=element), off, trials)
+
+
+def _typical_loss(shaft: Shaft, clues: Clues) -> float:
+    """Return what the friction of a shaft loses at its mean speed, W."""
+    speed = max(float(np.mean(np.abs(clues.speeds(shaft.name)))), 1e-12)
+    friction = bind(shaft.friction, f"{shaft.name}.friction", clues.numbers)
+    return max(speed * float(friction.magnitude("positive", speed, 0.0)), 1e-12)

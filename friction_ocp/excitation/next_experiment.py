@@ -53,10 +53,11 @@ class FollowUp:
 
 
 def follow_up(diagnosis: Diagnosis, executor: AbstractExecutor = InProcess()) -> FollowUp | None:
-    """Return what to record to separate the members of the first alias set; None where there is none."""
-    if not diagnosis.alias_sets:
+    """Return what to record to separate the members of the first alias set, or set of what comes as near; or None."""
+    sets = diagnosis.alias_sets or diagnosis.as_near
+    if not sets:
         return None
-    wanted = set(diagnosis.alias_sets[0])
+    wanted = set(sets[0])
     done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
     rivals = [rival for rival in shown(done.choice.aliases) if rival.key in wanted]
     keys = tuple(rival.key for rival in rivals)

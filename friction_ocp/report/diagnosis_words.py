@@ -48,12 +48,17 @@ def _cut_short(result: Json) -> str:
 
 
 def _with_rivals(result: Json) -> list[str]:
-    """Name every accepted effect, with those that the recordings cannot tell it from."""
-    sets = [[_named(item) for item in members] for members in rows(result, "alias_sets")]
+    """Name every accepted effect, with those that the recordings cannot tell it from, or that come as near."""
+    aliases, near = (
+        [[_named(item) for item in members] for members in rows(result, key)] for key in ("alias_sets", "as_near")
+    )
     found: list[str] = []
     for name in (_named(item) for item in rows(result, "accepted")):
-        others = [other for members in sets if members[0] == name for other in members[1:]]
+        others, close = (
+            [other for members in sets if members[0] == name for other in members[1:]] for sets in (aliases, near)
+        )
         doubt = f" (or {' or '.join(others)}: these recordings cannot tell)" if others else ""
+        doubt += f" ({' and '.join(close)} came as near)" if close else ""
         found.append(f"{name}{doubt}")
     return found
 
@@ -99,8 +104,12 @@ def superseded_sentences(result: Json) -> list[str]:
 
 
 def alias_sentences(result: Json) -> list[str]:
-    """Name the members of every alias set."""
-    return [" or ".join(_named(item) for item in members) for members in rows(result, "alias_sets")]
+    """Name the members of every alias set, and of every set of what comes as near where more than noise is left."""
+    aliases, near = (
+        [" or ".join(_named(item) for item in members) for members in rows(result, key)]
+        for key in ("alias_sets", "as_near")
+    )
+    return [*aliases, *(f"{names}, none of which explains all" for names in near)]
 
 
 def blind_spot_sentences(result: Json) -> list[str]:

@@ -82,11 +82,14 @@ figure.savefig(OUT / "gains.png", dpi=120)
 # ## What cannot be told apart
 #
 # Members of an alias set explain these recordings equally well. The best of them is accepted, because the model is
-# better with it; which of them it is remains open until something is recorded that separates them.
+# better with it; which of them it is remains open until something is recorded that separates them. Where more than
+# noise is left, as here, the cause need not be among them: they come as near, no more.
 
 # %%
 for members in result["alias_sets"]:
     print("cannot be told apart:", " or ".join(f"{item['effect']} at {item['component']}" for item in members))
+for members in result["as_near"]:
+    print("come as near:", " and ".join(f"{item['effect']} at {item['component']}" for item in members))
 if result["next_experiment"]:
     print(result["next_experiment"]["text"])
 

@@ -83,3 +83,20 @@ def test_loaded_friction_that_falls_with_the_speed_gets_that_shape(tmp_path: Pat
     assert found.accepted == (("load_dependence", "motor"),)
     assert found.final.values["motor.friction.load.stribeck"] == pytest.approx(share, rel=0.1)
     assert found.final.values["motor.friction.load.omega_s"] == pytest.approx(speed, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("power", "share"), [(0.0, 0.0), (8.0, 1.0)])
+def test_what_warms_friction_is_told(power: float, share: float, tmp_path: Path) -> None:
+    """Friction that its own losses warm is told from friction that time alone does, and how fast it settles."""
+    settles, change = 1.5, -0.4
+    path = write_case(
+        tmp_path,
+        shaft(warm_up=PlantWarmUp(settles, change, change, power))(),
+        effects=["warm_up", "quadratic_drag", "asymmetry"],
+    )
+    found = diagnose(load_problem(path))
+    assert found.accepted == (("warm_up", "motor"),)
+    values = found.final.values
+    assert values["motor.friction.warm_up.loss_share"] == pytest.approx(share, abs=0.1)
+    assert values["motor.friction.warm_up.time_constant"] == pytest.approx(settles, rel=0.1)

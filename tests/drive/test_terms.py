@@ -111,6 +111,12 @@ def warmth(t: float) -> float:
     return 1 + 0.01 * (TEMPERATURE - 20) - 0.3 * risen(t)
 
 
+def warmed(t: float, x: Sequence[float]) -> list[float]:
+    _, omega, warm = x
+    torque = 0.1 * (1 - 0.3 * warm) + 0.02 * omega * (1 - 0.7 * warm)
+    return [omega, (command(t) - torque) / J, (0.4 + 0.6 * torque * omega / 5.0 - warm) / 0.15]
+
+
 def bristle(t: float, x: Sequence[float]) -> list[float]:
     theta, omega, z = x
     level = (0.1 + 0.05 * np.exp(-((omega / 2.0) ** 2))) * (1 + wave(AMPLITUDES, PERIOD, theta)) * warmth(t)
@@ -282,6 +288,11 @@ CASES: dict[str, Case] = {
         MOVING,
         one_mass(lambda t, q, v: command(t) - 0.1 * warmth(t) - 0.02 * v * (warmth(t) - 0.4 * risen(t))),
     ),
+    "warm-up by losses": Case(
+        axis(FrictionElement(LAW, warm_up=WarmUp(0.0, -0.3, 0.15, 20.0, -0.4, 0.6, 5.0))),
+        MOVING | {"axis.friction.warmth": 0.2},
+        warmed,
+    ),
     "warm-up and ripple, polyline": Case(
         axis(FrictionElement(Polyline(0.1, (0.02,)), ripple=Ripple(*AMPLITUDES, PERIOD), warm_up=WARM)),
         MOVING,
@@ -333,6 +344,9 @@ def step_of(drive: Drive) -> tuple[SteppedDrive, np.ndarray]:
 ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "axis.friction.ripple": lambda off: axis(FrictionElement(LAW, ripple=Ripple(off, off, PERIOD))),
     "axis.friction.warm_up": lambda off: axis(FrictionElement(LAW, warm_up=WarmUp(off, off, 0.2))),
+    "axis.friction.warm_up.loss_share": lambda off: axis(
+        FrictionElement(LAW, warm_up=WarmUp(0.0, 0.3, 0.2, loss_share=off, power=0.5))
+    ),
     "servo.cogging": lambda off: axis(PLAIN, Motor("servo", "axis", cogging=Cogging(off, off, PERIOD))),
     "servo.torque_ripple": lambda off: axis(PLAIN, Motor("servo", "axis", torque_ripple=TorqueRipple(off, off, 0.9))),
     "axis.disturbance": lambda off: axis(PLAIN, shaft=Shaft("axis", J, disturbance=Disturbance(off, off, 0.2))),
@@ -345,7 +359,7 @@ ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
 }
 AMPLITUDE = (
-    *("cosine", "sine", "per_kelvin", "amplitude", "lag", "saturation"),
+    *("cosine", "sine", "per_kelvin", "amplitude", "loss_share", "lag", "saturation"),
     *("stiffening", "hysteresis.torque", "second_stage.stiffness"),
 )
 
@@ -357,14 +371,18 @@ def sensed(eccentricity: Eccentricity | None) -> Drive:
     )
 
 
-ABSENT = {"theta": sensed(None), "axis-load": pair(SPRING)}
+ABSENT = {
+    "theta": sensed(None),
+    "axis-load": pair(SPRING),
+    "axis.friction.warm_up.loss_share": axis(FrictionElement(LAW, warm_up=WarmUp(0.0, 0.3, 0.2))),
+}
 
 
 @pytest.mark.parametrize("name", ZERO_TERMS)
 def test_a_plain_zero_costs_nothing(name: str) -> None:
     """A term whose amplitudes are plain zeros leaves no number, input, state or instruction behind."""
     off, _ = step_of(ZERO_TERMS[name](0.0))
-    absent, _ = step_of(ABSENT.get(name.split(".")[0], axis(PLAIN)))
+    absent, _ = step_of(ABSENT.get(name) or ABSENT.get(name.split(".")[0], axis(PLAIN)))
     for made in ("parameter_names", "input_names", "state_names"):
         assert getattr(off, made) == getattr(absent, made)
     assert off.step.n_instructions() == absent.step.n_instructions()
@@ -474,11 +492,12 @@ def test_friction_that_vanishes_does_not_push() -> None:
 
 
 def test_what_a_term_needs_is_asked_for() -> None:
-    """Friction that follows the temperature needs a channel for it, one that settles a time constant."""
-    drive = axis(FrictionElement(LAW, warm_up=WarmUp(0.01, 0.1)))
+    """Friction that follows the temperature needs a channel; one that settles a time, and the losses that warm it."""
+    drive = axis(FrictionElement(LAW, warm_up=WarmUp(0.01, 0.1, loss_share=0.5)))
     with pytest.raises(FrictionOcpError) as refusal:
         stepped(replace(drive, channels=(drive.channels[0], drive.channels[2])))
     assert [finding.where for finding in refusal.value.findings] == [
         "axis.friction.warm_up.per_kelvin",
         "axis.friction.warm_up.time_constant",
+        "axis.friction.warm_up.power",
     ]

@@ -49,6 +49,7 @@ PLANTS: dict[str, Plant] = {
     "friction ripple, lugre": pair(replace(SHAFT, friction=LUGRE, ripple=RIPPLE)),
     "disturbance": pair(replace(SHAFT, disturbance=PlantRipple(0.11, 0.05, 0.1))),
     "warm-up": pair(replace(SHAFT, warm_up=PlantWarmUp(0.8, -0.4, -0.4))),
+    "warm-up by losses": pair(replace(SHAFT, warm_up=PlantWarmUp(0.8, -0.4, -0.6, power=2.0))),
     "lag": pair(motor=replace(MOTOR, amplifier=PlantAmplifier(time_constant=0.02))),
     "saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 2.0))),
     "sharp saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 4.0))),

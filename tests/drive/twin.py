@@ -97,8 +97,8 @@ def _wave(term: type[Any], ripple: PlantRipple | None) -> Any:
 def _warm_up(warm_up: PlantWarmUp | None) -> WarmUp | None:
     if warm_up is None:
         return None
-    assert warm_up.dry == warm_up.viscous and warm_up.power == 0.0
-    return WarmUp(0.0, warm_up.dry, warm_up.time_constant)
+    warm = WarmUp(0.0, warm_up.dry, warm_up.time_constant, viscous_excess=warm_up.viscous - warm_up.dry)
+    return replace(warm, loss_share=1.0, power=warm_up.power) if warm_up.power else warm
 
 
 def _eccentric(sensor: PlantSensor) -> Channel:

@@ -42,3 +42,28 @@ def test_motion_tells_whether_a_current_was_limited_or_its_record(
     found = [item for item in check(load_problem(workshop.problem())) if "is clipped" in item.what]
     assert [item.severity for item in found] == [severity]
     assert ("amplifier was at its limit" in found[0].remedy) == flows
+
+
+@pytest.mark.parametrize(("stated", "found"), [(LIMIT, []), (1.5 * LIMIT, ["error"])])
+def test_a_command_may_stay_at_the_stated_limits_of_its_controller(
+    workshop: Workshop, stated: float, found: list[str]
+) -> None:
+    """A recorded command without noise that saturates is as it should be; one cut off elsewhere is not."""
+    time = np.arange(0.0, 6.0, 0.002)
+    current = np.clip(0.6 * np.sin(2 * np.pi * 0.7 * time), -LIMIT, LIMIT)
+
+    def record(file: Any) -> None:
+        for name, values in (("current", current), ("position", turned(time, current))):
+            file[f"/channels/{name}"][...] = values
+        file["/channels/wanted"] = 3.0 * np.sin(2 * np.pi * 0.7 * time)
+        file["/channels/wanted"].attrs["unit"] = "rad"
+
+    def close(content: dict[str, Any]) -> None:
+        loop = {"type": "pd", "feedback": "position", "output": "current", "kp": 1.0, "kd": 0.1, "sample_time": 0.002}
+        content["drive"]["controller"] = loop | {"saturation": [-stated, stated]}
+        content["channels"]["wanted"] = {"measures": "reference.theta", "role": "input"}
+        content["channels"]["current"]["role"] = "output"
+
+    workshop.recording(spoil=record)
+    findings = check(load_problem(workshop.problem(close)))
+    assert [item.severity for item in findings if "is clipped" in item.what] == found

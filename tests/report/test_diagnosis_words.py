@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from friction_ocp.report.diagnosis_words import blind_spot_sentences, diagnosis_sentence, superseded_sentences
+from friction_ocp.report.diagnosis_words import (
+    alias_sentences,
+    blind_spot_sentences,
+    diagnosis_sentence,
+    superseded_sentences,
+)
 
 LOAD = {"effect": "load_dependence", "component": "servo"}
 COGGING = {"effect": "cogging", "component": "servo"}
@@ -18,8 +23,10 @@ def result(verdict: str, **changes: Any) -> dict[str, Any]:
 
 def test_an_effect_beside_an_unknown_rest_is_told_with_its_rivals() -> None:
     """The part that is explained, what else may explain it, and that a rest is left are in one sentence."""
-    said = diagnosis_sentence(result("unknown_effect", accepted=[LOAD, LAG], alias_sets=[[LOAD, COGGING]]))
-    assert said.startswith("Explained in part: the model lacked load dependence at servo (or cogging at servo:")
+    unknown = result("unknown_effect", accepted=[LOAD, LAG], as_near=[[LOAD, COGGING]])
+    said = diagnosis_sentence(unknown)
+    assert said.startswith("Explained in part: the model lacked load dependence at servo (cogging at servo came as ")
+    assert alias_sentences(unknown) == ["load dependence at servo or cogging at servo, none of which explains all"]
     assert "and drive lag at servo, with which 50 % of the excess error is gone" in said
     assert said.endswith("what is left is more than noise, and nothing in the catalogue explains it.")
 
@@ -28,6 +35,13 @@ def test_an_unknown_effect_alone_is_no_part() -> None:
     """Where nothing was found the sentence does not speak of a part."""
     assert "in part" not in diagnosis_sentence(result("unknown_effect", accepted=[]))
     assert "cannot tell" not in diagnosis_sentence(result("explained"))
+
+
+def test_aliases_are_told_as_what_recordings_cannot_tell_apart() -> None:
+    """Where noise is left, one of the members is the cause."""
+    undecided = result("undecided", accepted=[LOAD], alias_sets=[[LOAD, COGGING]])
+    assert "several causes fit it: most likely load dependence at servo" in diagnosis_sentence(undecided)
+    assert alias_sentences(undecided) == ["load dependence at servo or cogging at servo"]
 
 
 def test_what_recordings_are_too_fast_for_is_told_with_the_speed_to_record() -> None:

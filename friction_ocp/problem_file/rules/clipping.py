@@ -17,6 +17,8 @@ from friction_ocp.simulation.grid import IntArray
 
 _STRAIGHT = 1e-9
 """Fourth differences of straight ramps and plateaus, as a share of the range: only rounding."""
+_AT_LIMIT = 1e-3
+"""Distance from a limit of the controller, over their range, of a command that is at it: rounding."""
 _CERTAIN = 5.0
 """Standard errors by which the motion must ask for more effort than the record shows; model errors are not white."""
 _MATERIAL = 0.1
@@ -28,13 +30,16 @@ _FEW, _MANY = 8, 50
 def channels_are_not_clipped(case: Case) -> Iterator[Finding]:
     """A measurement does not run into the end of its range.
 
-    Set points are left out. An effort at its limits is true where the amplifier is at its limit, which the motion
-    tells; an input of nothing but ramps and plateaus may be a command, which is only doubtful.
+    Set points are left out, and what stays at the stated limits of the controller that commands it. An effort at its
+    limits is true where the amplifier is at its limit, which the motion tells; an input of nothing but ramps and
+    plateaus may be a command, which is only doubtful.
     """
     for place, use in case.uses():
         for channel in case.drive.channels:
             recorded = use.recording.channels.get(channel.name)
             if recorded is None or _is_command(channel) or not is_clipped(recorded.values):
+                continue
+            if _limited(case, channel, recorded):
                 continue
             low, high = float(np.nanmin(recorded.values)), float(np.nanmax(recorded.values))
             limits = f"{quantity_text(low, recorded.unit)} or {quantity_text(high, recorded.unit)}"
@@ -54,6 +59,19 @@ def _is_command(channel: Channel) -> bool:
         "supply_voltage",
         "current_command",
     )
+
+
+def _limited(case: Case, channel: Channel, recorded: RecordedChannel) -> bool:
+    """Whether a channel shows a controller's command, and every extreme at which it stays is one of its limits."""
+    controller = case.bound.controller
+    motor = next((item for item in case.bound.motors if item.name == channel.part), None)
+    if controller is None or motor is None or controller.saturation is None or channel.signal != controller.output:
+        return False
+    bound = next(item for item in case.bound.channels if item.name == channel.name)
+    limits = [bound.gain * motor.share * limit + bound.offset for limit in controller.saturation]
+    starts, _ = plateaus(recorded.values)
+    near = max(channel.resolution or 0.0, _AT_LIMIT * abs(limits[1] - limits[0]))
+    return all(min(abs(recorded.values[k] - limit) for limit in limits) <= near for k in starts)
 
 
 def _is_straight(recorded: RecordedChannel) -> bool:

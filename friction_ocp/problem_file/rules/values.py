@@ -15,14 +15,14 @@ from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 
 _POSITIVE = {
     *("resistance", "inductance", "stiffness", "omega_s", "delta", "sigma0", "omega_zero"),
-    *("width", "period", "other_period", "time_constant", "twist", "saturation_sharpness"),
+    *("width", "period", "other_period", "time_constant", "twist", "saturation_sharpness", "power"),
 }
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
 _MAY_BE_ZERO = ".second_stage.stiffness"
 """A stiffness that adds to another."""
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _BELOW_ONE = {"rounding"}
-_SHARE = {"lag_hidden"}
+_SHARE = {"lag_hidden", "loss_share"}
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
 _DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
