@@ -23,7 +23,7 @@ from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
-from friction_ocp.diagnosis.stated import contradictions, corrected
+from friction_ocp.diagnosis.stated import STATED, contradictions, corrected
 from friction_ocp.diagnosis.worth import Key, innovations
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
@@ -85,10 +85,11 @@ class Diagnosis:
     def carries_over(self) -> bool:
         """Whether what was added shrinks the gap on recordings that took no part, or leaves nothing of it there.
 
-        They take no part in choosing; but what helps where it was fitted alone explains nothing. Where the innovations
-        showed no gap, and only a stated value was wrong, there is none to shrink.
+        They take no part in choosing; but what helps where it was fitted alone explains nothing. Where only a stated
+        value was wrong, and the innovations showed no gap, there is none to shrink.
         """
         shown = any(item.excess.significant(self.level) for item in (*self.rounds, *self.superseded))
+        shown |= any(effect not in STATED for effect, _ in self.accepted)
         return not (self.accepted and shown) or carries_over(self.before, self.after, self.problem.estimation.seed)
 
     @property
