@@ -22,7 +22,7 @@ from friction_ocp.simulation.grid import FloatArray
 SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
 MOST_OF = 0.5
-"""Share of a large misfit short of which a small effect has not explained it, and a large one is tried."""
+"""Share of a misfit short of which a small effect has not explained it, and a large one is tried."""
 NUDGES, NUDGE, CLOSE_BY = 2, 0.05, 1.2
 """Fits that begin again at a time, the relative change of the parameters from which they do, and their objective after
 a few steps over the known one up to which they go on."""
@@ -33,8 +33,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
 
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
-    where most of that stays, steps begin at a large effect, too. Of free runs that miss much steps begin where loosely
-    joined segments lead, too, and so they always do at a large effect that no prediction shows.
+    where most of a misfit stays, steps begin at a large effect, too. Of free runs that miss much steps begin where
+    loosely joined segments lead, too, and so they always do at a large effect that no prediction shows.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -51,7 +51,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         loose.append({**base.values, **item.augmentation.outright})
     ends += [timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK) for values in loose]
     large, best = item.augmentation.large, min(end.objective for end in ends)
-    if base.astray and large is not None and base.objective - best < MOST_OF * base.objective:
+    beyond = base.objective * (1.0 - 1.0 / max(base.missed, 1.0))
+    if large is not None and base.objective - best < MOST_OF * beyond:
         tried = [large(start.added(item.augmentation.off)) for start in item.starts]
         ends += [
             _steps(base, model, program, _point(base, model, built, {**base.values, **values})) for values in tried
