@@ -11,9 +11,9 @@ from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
-from friction_ocp.diagnosis.excess import DOUBTED, excess
+from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer
+from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.left_out import left_out_before_and_after
@@ -25,8 +25,8 @@ from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn, without
 from friction_ocp.diagnosis.slow_torque import significant
+from friction_ocp.diagnosis.stand_ins import fall_short, helps
 from friction_ocp.diagnosis.worth import (
-    ALMOST,
     Key,
     gain,
     innovations,
@@ -46,17 +46,8 @@ NOTABLE = 0.05
 MOST_STEPS, MOST_RUNS = 1.5e9, 2900.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
-PART = 0.25
-"""Share of the gap below which additions that leave more than noise are taken back: less than that was a stand-in for
-something outside the catalogue in all 3 cases of the blind suite of seed 20261130. On real machines, where something is
-always left, half of the gap may be all that the largest effect explains."""
 INSTEAD = 2
 """Other effects, nearest first, from which the search goes on where the first addition leads nowhere."""
-SHARED = 0.5
-"""Share that free runs of recordings left out lose over that of the fitted ones, at least: causes came to 0.7 and more,
-stand-ins for a limited rate of the current to 0.3 and 0.4 (blind suites of seeds 20261203 and 20261204)."""
-NOTABLE_REST = 0.25
-"""Share that is left of free runs' gap above which something further is looked for."""
 HOPE = 0.25
 """Predicted gain over that share from which a refit is tried: predictions fall short where effects are large."""
 
@@ -123,7 +114,7 @@ class Search:
             self._take(done.accepted)
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
-                if not self._falls_short():
+                if not fall_short(*self._left_out(self.bench)):
                     break
             if self._exhausted():
                 break
@@ -321,6 +312,9 @@ class Search:
             self._compared = (bench.current, *left_out_before_and_after(bench, self.run))
         return self._compared[1:]
 
+    def _helps(self, bench: Bench) -> bool:
+        return helps(bench.base, bench.current, self.level, lambda: self._left_out(bench))
+
     def _withdraw(self) -> None:
         """Take back what does not help, for what the recordings could not tell from the first addition and does.
 
@@ -337,38 +331,6 @@ class Search:
                 self.bench, self.rounds, self.accepted = bench, [held], [rival.key]
                 return
         self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(first)], []
-
-    def _helps(self, bench: Bench) -> bool:
-        """Whether what was added takes a part, and makes free runs of training recordings left out better.
-
-        Else what was added is no more than the shadow of what is not known, be it most of it where it was fitted. Free
-        runs that are lost say nothing, and against what takes almost all they say no more than that something else is
-        missing. Where no more than noise is left a part of what they show has to go, too: nothing else is missing then.
-        Otherwise half the share that goes where it was fitted: what moves the machine shows in its motion.
-        """
-        base, current = bench.base, bench.current
-        if not innovations(current).significant(self.level):
-            before, after = self._left_out(bench)
-            left = max(DOUBTED - 1.0, (1.0 - PART) * before.excess())
-            return before.lost or after.drowned or after.excess() <= left
-        taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
-        if taken < PART * whole:
-            return False
-        if 0.0 < ALMOST * whole <= taken:
-            return True
-        before, after = self._left_out(bench)
-        if before.lost or after.drowned:
-            return True
-        as_much = after.excess() <= (1.0 - SHARED * taken / whole) * before.excess()
-        return as_much and comes_closer(before, after, self.bench.problem.estimation.seed)
-
-    def _falls_short(self) -> bool:
-        """Whether a notable part of the gap that free runs of training recordings had is left, where they took no part.
-
-        Small slow torques hide below the noise of samples and yet move the drive.
-        """
-        before, after = self._left_out(self.bench)
-        return not before.lost and not after.drowned and after.excess() > NOTABLE_REST * before.excess()
 
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
         """Decide on an addition to the model of a bench, or on a more general shape of what it has.

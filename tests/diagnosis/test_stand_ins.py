@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from friction_ocp.diagnosis import reexamine, search
+from friction_ocp.diagnosis import reexamine, search, stand_ins
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Choice, Round
 from friction_ocp.diagnosis.worth import Key
@@ -37,15 +37,13 @@ def test_an_addition_has_to_help_free_runs_too(
     monkeypatch: pytest.MonkeyPatch, noise: bool, taken: float, before: Any, after: Any, helps: bool
 ) -> None:
     """What helps from sample to sample alone is taken back, unless free runs can say nothing or noise moves them."""
-    base, current = SimpleNamespace(cost=100.0), SimpleNamespace(cost=100.0 * (1.0 - taken))
+    model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
+    base, current = SimpleNamespace(cost=100.0), SimpleNamespace(cost=100.0 * (1.0 - taken), model=model)
     power = SimpleNamespace(significant=lambda level: not noise)
-    monkeypatch.setattr(search, "innovations", lambda fitted: power)
-    monkeypatch.setattr(search, "samples", lambda fitted: 0)
-    monkeypatch.setattr(search, "comes_closer", lambda one, other, seed: other.excess() < one.excess())
-    estimation = SimpleNamespace(estimation=SimpleNamespace(seed=0))
-    bench = SimpleNamespace(base=base, current=current, problem=estimation)
-    looking = SimpleNamespace(level=0.01, bench=bench, _left_out=lambda bench: (before, after))
-    assert Search._helps(cast(Any, looking), cast(Any, bench)) == helps
+    monkeypatch.setattr(stand_ins, "innovations", lambda fitted: power)
+    monkeypatch.setattr(stand_ins, "samples", lambda fitted: 0)
+    monkeypatch.setattr(stand_ins, "comes_closer", lambda one, other, seed: other.excess() < one.excess())
+    assert stand_ins.helps(cast(Any, base), cast(Any, current), 0.01, lambda: (before, after)) == helps
 
 
 def rival(key: Key, cost: float, determined: int) -> Any:
