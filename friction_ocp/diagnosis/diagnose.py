@@ -29,6 +29,8 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.statistics.execution import Execution
 
+LEAST_SHARE = 0.25
+"""Of the effort, for the inputs read another way where the search before took more than the rest."""
 MOST_PARTS = 4
 """Parts whose stated values may be taken back."""
 
@@ -171,19 +173,21 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     if not able:
         return stated
     other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)
-    read = _diagnosed(other, tell, execution)
+    read = _diagnosed(other, tell, execution, share=max(1.0 - stated.effort, LEAST_SHARE))
     simpler = not read.left_over and (left or len(read.accepted) < len(accepted))
     return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
 
 
-def _diagnosed(problem: Problem, tell: Tell, execution: Execution, readings: OtherReadings | None = None) -> Diagnosis:
-    """Find what a model lacks, the inputs read as the problem says; others are fitted beside.
+def _diagnosed(
+    problem: Problem, tell: Tell, execution: Execution, readings: OtherReadings | None = None, share: float = 1.0
+) -> Diagnosis:
+    """Find what a model lacks, the inputs read as the problem says, by a share of the effort; others are fitted beside.
 
     The base fit, score tests and refits of a round are tasks: in whatever process, with the same numbers, and taken
     from the output folder where an earlier run ended them.
     """
     began = time.perf_counter()
-    level, meant, patience = level_of(problem), considered(problem), effort_of(problem)
+    level, meant, patience = level_of(problem), considered(problem), share * effort_of(problem)
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
         run = replace(execution, executor=executor)
