@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import COLUMNS, Experiment
-from friction_ocp.estimation.gap import acceleration_noise
+from friction_ocp.estimation.gap import acceleration_noise, start_weight
 from friction_ocp.estimation.horizon import is_held
 from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.noise import noise_floor
@@ -95,7 +95,7 @@ class Footing:
         further = np.flatnonzero(np.isin(item.grid.time, self.divided.get(item.name, ())))
         first = np.unique(np.concatenate([first, further[further < first[-1]]])).astype(np.int64)
         start = np.zeros((len(first) - 1, model.state_scale.size))
-        start[0] = 1.0 / model.state_scale
+        start[0] = start_weight(model, item)
         weights = gap_roots(model, self, item, first, impulses)
         if model.problem.estimation.initial_state == "measured":
             return Segments(first, weights, measured=1)

@@ -16,7 +16,7 @@ from friction_ocp.drive.coordinates import group_accelerations, group_angles, gr
 from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import losses, motor_loads, through_joint, transmitted_torque
-from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.mechanism import WARMTH, Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import extra_rates, lag_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
@@ -162,7 +162,7 @@ def _state_unit(mech: Mechanism, name: str) -> str:
         return command_unit(drive, drive.controller)
     if signal == "lagged":
         return signal_unit(drive, f"{part}.{mech.driving_signal(drive.motor(part))}")
-    if signal == "friction.warmth":
+    if name.endswith(WARMTH):
         return si_unit("dimensionless")
     if signal == "hysteresis.z":
         part = next(item.to_shaft for item in mech.looping if item.name == part)

@@ -20,6 +20,8 @@ from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.friction.modifiers import Surroundings
 
+WARMTH = ".friction.warmth"
+"""How the states are called that say how far the friction of shafts has settled, after the name of the shaft."""
 ROOT_STEPS = 2
 """Newton's steps from the mean ratio back through joints with kinematic errors."""
 
@@ -148,7 +150,7 @@ class Mechanism:
             *self.extra_names,
             *(f"{motor.name}.lagged" for motor in self.lagging),
             *(f"{item.name}.hysteresis.z" for item in self.looping),
-            *(f"{shaft.name}.friction.warmth" for shaft in self.warming),
+            *(shaft.name + WARMTH for shaft in self.warming),
             *self.memory_names,
         )
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from friction_ocp.drive.mechanism import Mechanism
+from friction_ocp.drive.inputs import TIME
+from friction_ocp.drive.mechanism import WARMTH, Mechanism
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.simulation.grid import FloatArray, IntArray
@@ -16,6 +17,8 @@ RELATIVE_GAP = 0.05
 """Standard deviation of a gap over the typical size of its state, where no process noise is stated."""
 DETERMINISTIC_GAP = 1e-4
 """The same for states that no noise enters: bristles, currents, the memory of a controller."""
+AT_ONCE = 0.01
+"""Share of a recording up to which a piece of it begins with it."""
 BRISTLE_GAP = 0.01
 """The same for bristles."""
 
@@ -28,6 +31,21 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)
+
+
+def start_weight(model: Model, item: Experiment) -> FloatArray:
+    """Return (states,) 1 / standard deviation of the prior on the first state of a recording, or of a piece of one.
+
+    States are as uncertain as they are large; but how far friction has warmed up is counted from the start of the
+    recording.
+    """
+    weight = 1.0 / model.state_scale
+    names = model.drive.input_names
+    if TIME in names:
+        gone = float(item.grid.at_node[0, names.index(TIME)]) / float(item.grid.time[-1] - item.grid.time[0])
+        cold = np.array([name.endswith(WARMTH) and gone < AT_ONCE for name in model.drive.state_names], dtype=bool)
+        weight[cold] /= DETERMINISTIC_GAP
+    return weight
 
 
 def gap_covariance(model: Model, item: Experiment, spans: FloatArray, shares: FloatArray | float = 1.0) -> FloatArray:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.drive.mechanism import WARMTH
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.gap import gap_weights
+from friction_ocp.estimation.gap import gap_weights, start_weight
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model
@@ -17,6 +18,8 @@ from friction_ocp.simulation.grid import IntArray
 from friction_ocp.simulation.losses import Absolute, AbstractLoss, Huber, Squares, StudentT
 
 PREDICTION_SAMPLES = 20
+TIED = (".friction.z", ".hysteresis.z", WARMTH)
+"""States that nothing but a prior keeps in reach where a window starts."""
 ROUNDINGS = (1.0, 0.2, 0.05, 0.01, 0.002, 0.0004)
 """Rounding of the absolute loss over the mean error, stage by stage."""
 WIDTHS = (0.1, 0.02, 0.0)
@@ -72,7 +75,7 @@ def relaxed(model: Model, experiments: Experiments, width: float, loss: Abstract
 
 def segments_at(model: Model, item: Experiment, first: IntArray) -> Segments:
     """Return segments of a recording joined by process noise, from their first nodes and the one behind them."""
-    return _with_start(model, Segments(first, gap_weights(model, item, first)))
+    return _with_start(model, item, Segments(first, gap_weights(model, item, first)))
 
 
 def along_measurement(model: Model, width: float) -> Program:
@@ -86,7 +89,7 @@ def along_measurement(model: Model, width: float) -> Program:
         weight = gap_weights(model, item, first)
         if fits_free_run(model):
             weight = np.tile(np.diag(1.0 / (NO_GAP * model.state_scale)), (len(first) - 2, 1, 1))
-        segments.append(_with_start(model, Segments(first, weight)))
+        segments.append(_with_start(model, item, Segments(first, weight)))
     return program_of(model, model.train, tuple(segments), width, Squares())
 
 
@@ -94,7 +97,7 @@ def free_run(
     model: Model, experiments: Experiments, width: float, loss: AbstractLoss, horizon: float | None
 ) -> Program:
     """Return the free run over whole recordings, or over windows of `horizon` s that each start afresh."""
-    segments = tuple(_with_start(model, Segments(windows(item, horizon), None)) for item in experiments)
+    segments = tuple(_with_start(model, item, Segments(windows(item, horizon), None)) for item in experiments)
     return program_of(model, experiments, segments, width, loss)
 
 
@@ -106,19 +109,19 @@ def windows(item: Experiment, horizon: float | None) -> IntArray:
     return np.unique(np.clip(np.searchsorted(item.grid.time, edges - 1e-9), 0, item.grid.time.size - 1))
 
 
-def _with_start(model: Model, cut: Segments) -> Segments:
+def _with_start(model: Model, item: Experiment, cut: Segments) -> Segments:
     """Tie the first state to the measurement: exactly, or with a prior of its typical size.
 
-    A bristle's deflection is tied so at the start of every window: what it was before is soon forgotten, and nothing
-    else would keep it in reach.
+    A bristle's deflection is tied so at the start of every window, and how far friction has warmed up: nothing else
+    would keep them in reach.
     """
     if model.problem.estimation.initial_state == "measured":
         return replace(cut, measured=1)
     weight = np.zeros((cut.count, model.state_scale.size))
-    weight[0] = 1.0 / model.state_scale
+    weight[0] = start_weight(model, item)
     if cut.gap_weight is None:
-        bristles = [".friction.z" in name or ".hysteresis.z" in name for name in model.drive.state_names]
-        weight[:, bristles] = weight[0, bristles]
+        tied = [any(part in name for part in TIED) for name in model.drive.state_names]
+        weight[1:, tied] = 1.0 / model.state_scale[tied]
     return replace(cut, start_weight=weight)
 
 

@@ -12,9 +12,10 @@ from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.footing import torque_noise
+from friction_ocp.diagnosis.footing import pieces, torque_noise
 from friction_ocp.diagnosis.gathered_noise import unit_covariances
 from friction_ocp.diagnosis.worth import innovations
+from friction_ocp.estimation.gap import start_weight
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.problem_file.load import load_problem
 
@@ -72,3 +73,19 @@ def test_noise_of_a_current_within_long_segments_is_no_gap(tmp_path: Path, monke
     assert fitted.linear.program.segments[0].count <= 45
     assert 0.1 < found.ratio < DOUBTED
     assert not found.significant(0.01)
+
+
+def test_warmth_is_known_where_a_recording_starts(tmp_path: Path) -> None:
+    """It is counted from there; a piece that begins later begins as warm as may be."""
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    warm = {"amplitude": {"guess": -0.1}, "time_constant": 1.0, "loss_share": 1.0, "power": 5.0}
+    document["drive"]["shafts"][0]["friction"]["warm_up"] = warm
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    model = prepare(load_problem(path))
+    at = model.drive.state_names.index("motor.friction.warmth")
+    whole, later = model.train[0], pieces(model.train[0], 2)[1]
+    usual = 1.0 / model.state_scale
+    assert start_weight(model, whole)[at] == pytest.approx(1e4 * usual[at])
+    assert start_weight(model, later) == pytest.approx(usual)
+    assert np.delete(start_weight(model, whole), at) == pytest.approx(np.delete(usual, at))
