@@ -136,11 +136,8 @@ def _friction(
 
 
 def _warmth_rates(mech: Mechanism, symbols: _Symbols, at: Motion, load: dict[str, Any]) -> ca.SX:
-    rates: list[Any] = []
-    for k, (shaft, loss) in enumerate(losses(mech, at, load)):
-        assert shaft.friction.warm_up is not None
-        rates.append(shaft.friction.warm_up.rate(symbols.warmth[k], loss))
-    return column(rates)
+    lost = enumerate(losses(mech, at, load))
+    return column([warm_up.rate(symbols.warmth[k], loss) for k, (warm_up, loss) in lost])
 
 
 def _acceleration(mech: Mechanism, at: Motion, group: int, torques: dict[str, Any], friction: dict[str, Any]) -> Any:

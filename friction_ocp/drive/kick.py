@@ -21,6 +21,7 @@ from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Shaft, Transmission
 from friction_ocp.drive.torques import applied_torques, elastic_torque
 from friction_ocp.friction.element import FrictionElement, StepResponse
+from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, where
 
 NEWTON_STEPS = 6
@@ -144,12 +145,13 @@ def transmitted_torque(mech: Mechanism, shaft: Shaft, load: dict[str, Any]) -> A
     return smooth_abs(sum(torques[1:], torques[0]))
 
 
-def losses(mech: Mechanism, motion: Motion, load: dict[str, Any]) -> Iterator[tuple[Shaft, Any]]:
-    """Yield the shafts that their friction's losses warm, and what is lost there at steady speed, W."""
-    for shaft in mech.warming:
+def losses(mech: Mechanism, motion: Motion, load: dict[str, Any]) -> Iterator[tuple[WarmUp, Any]]:
+    """Yield how the losses of friction warm a shaft, in the order of states, and what is lost there, W."""
+    for name, warm_up in mech.warming.items():
+        shaft = mech.drive.shaft(name)
         omega = mech.shaft_speed(shaft.name, motion)
         element = shaft.friction.under(mech.surroundings(shaft, motion))
-        yield shaft, omega * element.torque(omega, transmitted_torque(mech, shaft, load))
+        yield warm_up, omega * element.torque(omega, transmitted_torque(mech, shaft, load))
 
 
 def _solve(

@@ -18,7 +18,7 @@ from friction_ocp.drive.parts import Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.friction.modifiers import Surroundings
+from friction_ocp.friction.modifiers import Surroundings, WarmUp
 
 WARMTH = ".friction.warmth"
 """How the states are called that say how far the friction of shafts has settled, after the name of the shaft."""
@@ -129,10 +129,10 @@ class Mechanism:
         return tuple(item for item in self.topology.elastic if item.hysteresis is not None)
 
     @property
-    def warming(self) -> tuple[Shaft, ...]:
-        """Shafts whose friction is warmed by its own losses."""
-        parts = ((shaft, shaft.friction.warm_up) for shaft in self.drive.shafts)
-        return tuple(shaft for shaft, warm_up in parts if warm_up is not None and warm_up.by_losses)
+    def warming(self) -> dict[str, WarmUp]:
+        """By shaft, how its friction is warmed by its own losses, where it is."""
+        parts = ((shaft.name, shaft.friction.warm_up) for shaft in self.drive.shafts)
+        return {name: warm_up for name, warm_up in parts if warm_up is not None and warm_up.by_losses}
 
     @property
     def memory_names(self) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ class Mechanism:
             *self.extra_names,
             *(f"{motor.name}.lagged" for motor in self.lagging),
             *(f"{item.name}.hysteresis.z" for item in self.looping),
-            *(shaft.name + WARMTH for shaft in self.warming),
+            *(name + WARMTH for name in self.warming),
             *self.memory_names,
         )
 
@@ -245,7 +245,7 @@ class Mechanism:
     def surroundings(self, shaft: Shaft, motion: Motion) -> Surroundings:
         """Return what the friction of a shaft depends on beside speed and load."""
         theta, passed = self.angle_passed(shaft.name, motion)
-        warm = [item.name for item in self.warming]
+        warm = list(self.warming)
         warmth = motion.warmth[warm.index(shaft.name)] if motion.warmth is not None and shaft.name in warm else None
         return Surroundings(theta, passed, self.inputs.get(TIME, 0.0), self.true_input("temperature"), warmth)
 

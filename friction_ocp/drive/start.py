@@ -33,15 +33,9 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         at.extra,
         lagged,
         ca.SX.zeros(len(mech.looping)),
-        column([_warmth(mech, shaft) for shaft in mech.warming]),
+        column([warm_up.risen(mech.inputs[TIME]) for warm_up in mech.warming.values()]),
         column(memory),
     )
-
-
-def _warmth(mech: Mechanism, shaft: Shaft) -> Any:
-    """Return how far friction has settled since the start of the recording under the losses that it settles at."""
-    assert shaft.friction.warm_up is not None
-    return shaft.friction.warm_up.risen(mech.inputs[TIME])
 
 
 def unseen_states(mech: Mechanism) -> tuple[int, ...]:

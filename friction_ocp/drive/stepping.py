@@ -212,11 +212,8 @@ def _advance_bristles(mech: Mechanism, state: State, at: Motion, load: dict[str,
 
 def _advance_warmth(mech: Mechanism, state: State, at: Motion, load: dict[str, Any]) -> ca.SX:
     """Return how far friction has settled after a step at its mean speeds, which `at` has."""
-    after: list[Any] = []
-    for k, (shaft, loss) in enumerate(losses(mech, at, load)):
-        assert shaft.friction.warm_up is not None
-        after.append(shaft.friction.warm_up.after(at.h, state.warmth[k], loss))
-    return column(after)
+    lost = enumerate(losses(mech, at, load))
+    return column([warm_up.after(at.h, state.warmth[k], loss) for k, (warm_up, loss) in lost])
 
 
 def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX, late: Collection[str]) -> _Expression:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.spectrum import LINES, MOST_LINES, peaks, spectrum, without
-from friction_ocp.parameters import Free
+from friction_ocp.friction.element import FrictionElement
+from friction_ocp.parameters import Free, bind
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -247,6 +248,11 @@ class AbstractEffect(ABC):
     def addition(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         """Return the drive with the effect at a place; of a more general shape where it has it there already."""
         return self.reshaped(drive, place, clues) or self.augment(drive, place, clues)
+
+
+def fitted_friction(drive: Drive, place: str, clues: Clues) -> FrictionElement:
+    """Return the friction of a shaft with the numbers of the base fit."""
+    return bind(drive.shaft(place).friction, f"{place}.friction", clues.numbers)
 
 
 def change_shaft(drive: Drive, name: str, **changes: Any) -> Drive:

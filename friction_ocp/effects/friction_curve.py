@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
-from friction_ocp.drive.values import bind_drive
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
@@ -16,6 +15,7 @@ from friction_ocp.effects.effect import (
     Trial,
     change_shaft,
     either_way,
+    fitted_friction,
     moving_shafts,
     upwards,
 )
@@ -88,7 +88,7 @@ class StribeckEffect(AbstractEffect):
     def hiding(self, drive: Drive, place: str, clues: Clues) -> Hiding:
         """As large as the dry friction itself: breakaway at twice the Coulomb friction."""
         path, added = f"{place}.friction.added.stribeck", self.augment(drive, place, clues)
-        element = bind_drive(drive, clues.numbers).shaft(place).friction
+        element = fitted_friction(drive, place, clues)
         level = 0.5 * float(element.magnitude("positive", 0.0, 0.0) + element.magnitude("negative", 0.0, 0.0))
         tried = SHARE * clues.typical_torque[place]
         return Hiding(added, f"{path}.torque", f"{path}.omega_s", tried, level)

@@ -8,13 +8,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from friction_ocp.drive.parts import Drive, Shaft
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    change_shaft,
+    fitted_friction,
+    moving_shafts,
+)
 from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.friction.composite import plain_law, viscous_part
 from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
-from friction_ocp.parameters import Free, bind
+from friction_ocp.parameters import Free
 
 
 class WarmUpEffect(AbstractEffect):
@@ -45,7 +53,7 @@ class WarmUpEffect(AbstractEffect):
                 amplitude=Free(-0.1, -0.95, 5.0),
                 time_constant=Free(times[1], 0.01 * longest, 100 * longest),
                 loss_share=Free(0.5, 0.0, 1.0),
-                power=_typical_loss(shaft, clues),
+                power=_typical_loss(drive, place, clues),
             )
             if is_dry(shaft) and viscous_part(shaft.friction.law) is not None:
                 part = replace(part, viscous_excess=Free(0.0, -1.0, 5.0))
@@ -61,8 +69,7 @@ class WarmUpEffect(AbstractEffect):
         return Augmentation(change_shaft(drive, place, friction=element), off, trials)
 
 
-def _typical_loss(shaft: Shaft, clues: Clues) -> float:
+def _typical_loss(drive: Drive, place: str, clues: Clues) -> float:
     """Return what the friction of a shaft loses at its mean speed, W."""
-    speed = max(float(np.mean(np.abs(clues.speeds(shaft.name)))), 1e-12)
-    friction = bind(shaft.friction, f"{shaft.name}.friction", clues.numbers)
-    return max(speed * float(friction.magnitude("positive", speed, 0.0)), 1e-12)
+    speed = max(float(np.mean(np.abs(clues.speeds(place)))), 1e-12)
+    return max(speed * float(fitted_friction(drive, place, clues).magnitude("positive", speed, 0.0)), 1e-12)
