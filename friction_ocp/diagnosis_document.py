@@ -60,6 +60,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "assumptions": _assumptions(diagnosis),
         "effort": diagnosis.effort,
         "cut_short": diagnosis.cut_short,
+        "by_predictions": diagnosis.by_predictions,
         "seconds": diagnosis.seconds,
         "channel_units": _units(diagnosis),
         "provenance": provenance(problem, "diagnose"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from friction_ocp.diagnosis.easing import along, eased, finer
 from friction_ocp.diagnosis.fitted_model import FittedModel
@@ -56,6 +57,18 @@ def _fitted_base(model: Model) -> FittedModel:
     nodes = exact.point_along(program, end).nodes
     started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
     return freed(timed(_from_rest(_from_afar(started, [model.space.guess, end.theta]))))
+
+
+def predicting(fitted: FittedModel) -> FittedModel:
+    """Fit a base model to short predictions from the measured motion, from its guesses and from where it stands.
+
+    Where a model lacks much, segments that torque noise joins bear errors from one to the next, all the more where
+    motion is unstable, as friction that falls with speed makes it: no parameters lead on from there. A prediction
+    begins afresh, and shows its own error alone.
+    """
+    model, foot = fitted.model, replace(fitted.footing, predicted=True)
+    ends = [polished(model, foot, theta, None) for theta in (model.space.guess, fitted.theta)]
+    return min(ends, key=lambda end: end.objective)
 
 
 def _from_afar(fitted: FittedModel, starts: Sequence[FloatArray]) -> FittedModel:

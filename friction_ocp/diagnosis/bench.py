@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.base_fit import fit_base, predicting
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
@@ -205,6 +205,26 @@ def open_bench(problem: Problem, execution: Execution) -> Bench:
     bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
     noise = not innovations(bench.current).significant(level_of(problem))
     return bench if noise else opened_better(bench, execution)
+
+
+def open_predicting(bench: Bench, execution: Execution) -> Bench:
+    """Return the bench of a base model that is compared with others by short predictions from the measured motion."""
+    outcomes = run_tasks(
+        "base model by short predictions",
+        [Task("base-predicting", fit_predicting)],
+        bench,
+        bench.fingerprint,
+        execution.executor,
+        execution.ledger,
+    )
+    found = value_of(outcomes["base-predicting"])
+    return Bench(bench.problem, found["footing"], found["point"], Seat(bench.problem.drive, found["point"]))
+
+
+def fit_predicting(bench: Bench) -> Json:
+    """Fit the base model to short predictions; the value says where it stands."""
+    fitted = predicting(bench.base)
+    return {"footing": footing_document(fitted.footing), "point": point_document(fitted)}
 
 
 def opened_better(bench: Bench, execution: Execution) -> Bench:

@@ -74,7 +74,7 @@ def _torques(fitted: FittedModel, watch: _Watch, typical: Mapping[str, float]) -
             break
         size = {shaft: max(size[shaft], seen[shaft]) for shaft in size}
         finely = pulled(fine, size)
-    if fitted.footing.segment_s is None:
+    if not fitted.footing.joined:
         return pulled(fitted.model.problem.estimation.samples, size), finely
     return [_missing(fitted, item, watch) for item in fitted.linear.recordings], finely
 

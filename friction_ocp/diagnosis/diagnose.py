@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Tell, open_bench
+from friction_ocp.diagnosis.bench import Tell, open_bench, open_predicting
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import DOUBTED, Excess
@@ -62,6 +62,11 @@ class Diagnosis:
     """Whether the search ended there, with things left to try."""
     stated: Problem | None = None
     """The problem as it was given, where its inputs are not read as it states or its loop is opened."""
+
+    @property
+    def by_predictions(self) -> bool:
+        """Whether models were compared by short predictions, the simulation straying too far to lead anywhere."""
+        return self.base.footing.predicted
 
     @property
     def gap(self) -> bool:
@@ -193,6 +198,8 @@ def _diagnosed(
         run = replace(execution, executor=executor)
         search = Search(open_bench(problem, run), run, meant, level, tell, patience, readings)
         search.go()
+        if search.lost_its_way:
+            search = _by_predictions(search, run)
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
     current, checked = _checked(search.bench.current, base, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
@@ -218,6 +225,15 @@ def _diagnosed(
             cut_short=search.cut_short,
         )
     )
+
+
+def _by_predictions(search: Search, run: Execution) -> Search:
+    """Look for additions by short predictions where nothing leads on; return the search that found some."""
+    patience = max(search.patience - search.effort * search.patience, LEAST_SHARE * search.patience)
+    bench = open_predicting(search.bench.at(search.bench.base), run)
+    other = Search(bench, run, search.meant, search.level, search.tell, patience)
+    other.go()
+    return other if other.accepted else search
 
 
 def _in_hindsight(found: Diagnosis) -> Diagnosis:

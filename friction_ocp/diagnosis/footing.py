@@ -21,7 +21,7 @@ from friction_ocp.estimation.model import Model, seen_by
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import Segments
-from friction_ocp.estimation.stages import windows
+from friction_ocp.estimation.stages import measured_from, windows
 from friction_ocp.estimation.torque_noise import (
     MOST_SEGMENTS,
     QUARTERS,
@@ -70,6 +70,13 @@ class Footing:
     """Of measurement errors: the one that the problem asks for where free runs are compared."""
     divided: Mapping[str, tuple[float, ...]] = field(default_factory=dict[str, tuple[float, ...]])
     """By recording: times of further cuts, s."""
+    predicted: bool = False
+    """Whether models are compared by short predictions, each from the measured motion, instead."""
+
+    @property
+    def joined(self) -> bool:
+        """Whether segments begin where the best nodes are, and torque noise joins them."""
+        return self.segment_s is not None and not self.predicted
 
     def program(self, model: Model, experiments: tuple[Experiment, ...]) -> Program:
         """Return the likelihood of some recordings under a model, as a least-squares program."""
@@ -87,6 +94,8 @@ class Footing:
         return seen_by(model, model.drive, stepped, self.inputs)
 
     def _segments(self, model: Model, item: Experiment) -> Segments:
+        if self.predicted:
+            return measured_from(item)
         impulses = {} if self.segment_s is None else input_impulses(model, item, self.numbers[item.name])
         first = cuts(item, self.segment_s)
         if impulses:

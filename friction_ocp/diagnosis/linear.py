@@ -255,6 +255,7 @@ def _static_labels(count: int) -> tuple[FloatArray, IntArray, IntArray]:
 
 def linear_program(program: Program, point: Point) -> LinearProgram:
     """Linearise a program."""
+    point = program.placed(point)
     items = tuple(LinearRecording(program, index, point) for index in range(len(program.experiments)))
     labels = [item.labels() for item in items]
     space = program.space

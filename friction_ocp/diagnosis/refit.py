@@ -42,7 +42,7 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     points = [point for start in item.starts for point in _launches(base, item, start, model, built, program)]
     ends = [timed(_steps(base, model, program, point), QUICK) for point in points]
     best = min([end.objective for end in ends], default=np.inf)
-    if base.astray and base.footing.segment_s is not None and base.objective - best < item.gain:
+    if base.astray and base.footing.joined and base.objective - best < item.gain:
         away = [_point(base, model, built, base.values | start.added(item.augmentation.off)) for start in item.starts]
         far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]

@@ -89,6 +89,12 @@ class Search:
         """What the search has taken, over what it may take."""
         return (effort() - self._first) / self._most
 
+    @property
+    def lost_its_way(self) -> bool:
+        """Whether nothing was added to a model so far off that segments joined by noise lead nowhere."""
+        base = self.bench.base
+        return not self.accepted and base.astray and base.footing.joined
+
     def _exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""
         if self.effort < 1.0:

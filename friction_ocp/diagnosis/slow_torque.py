@@ -62,8 +62,11 @@ class Probe:
 
 
 def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
-    """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out."""
-    if fitted.footing.segment_s is None:
+    """Test shafts, elastic transmissions and channels; free runs, whose errors add up, are left out.
+
+    And so are short predictions, whose starts are as measured.
+    """
+    if not fitted.footing.joined:
         return ()
     places = [(probe, stretched(fitted, probe)) for probe in probes(fitted, clues)]
     by_torque = dict[str, FloatArray]()

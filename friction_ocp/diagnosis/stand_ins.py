@@ -28,8 +28,11 @@ def helps(
     `left_out` returns free runs of both where training recordings took no part in the fits. What does next to nothing
     for them is no more than a shadow, be it most of the gap where it was fitted: of what goes there half the share has
     to go here, for certain; of what leaves no more than noise a part. Free runs that are lost say nothing, and against
-    what takes almost all, yet not all, no more than that something else is missing.
+    what takes almost all, yet not all, no more than that something else is missing. Where models are compared by short
+    predictions free runs go astray whatever is added, and are not asked.
     """
+    if current.footing.predicted:
+        return base.cost - current.cost >= PART * (base.cost - 0.5 * samples(base))
     if not innovations(current).significant(level):
         before, after = left_out()
         return before.lost or after.drowned or after.excess() <= max(DOUBTED - 1.0, (1.0 - PART) * before.excess())

@@ -137,8 +137,12 @@ class Standard:
         them goes and not all, it is what else is missing that moves the runs. For the same reason
         they have to get better for certain, and by most of what they show, where nothing is missing from sample to
         sample and no slow torque either. What torque noise alone may do to free runs does not speak against an
-        addition.
+        addition. Where models are compared by short predictions free runs go astray whatever is added, and are not
+        asked.
         """
+        if self.current.footing.predicted:
+            one, other = self._beyond, innovations(fitted).beyond
+            return other <= (1.0 - OF_REST) * one and one - other > MATERIAL * (1.0 + other)
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
         one_step = (self._beyond, innovations(fitted).beyond)

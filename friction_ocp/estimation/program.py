@@ -167,6 +167,12 @@ class Program:
         signals = tuple(np.concatenate(signal).T for signal in zip(*columns, strict=True))
         return self.sweep.starts(sum(cut.measured for cut in self.segments)), signals
 
+    def placed(self, point: Point) -> Point:
+        """Return a point whose nodes that are no variables are where the measurement says under its parameters."""
+        starts = self.measured_starts(point.theta)
+        pairs = zip(starts, point.nodes, strict=True)
+        return Point(point.theta, tuple(np.concatenate([start, own[len(start) :]]) for (start, _), own in pairs))
+
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""
         nodes: list[FloatArray] = []

@@ -61,9 +61,13 @@ def cuts(experiment: Experiment, samples: int) -> IntArray:
 
 def predictions(model: Model, experiments: Experiments, width: float) -> Program:
     """Return short predictions from the smoothed motion: nearly linear in the parameters, right from any start."""
-    segments = [cuts(item, PREDICTION_SAMPLES) for item in experiments]
-    held = tuple(Segments(first, None, measured=len(first) - 1) for first in segments)
-    return program_of(model, experiments, held, width, Squares())
+    return program_of(model, experiments, tuple(map(measured_from, experiments)), width, Squares())
+
+
+def measured_from(item: Experiment) -> Segments:
+    """Return short segments of a recording that begin where the measured motion is."""
+    first = cuts(item, PREDICTION_SAMPLES)
+    return Segments(first, None, measured=len(first) - 1)
 
 
 def relaxed(model: Model, experiments: Experiments, width: float, loss: AbstractLoss) -> Program:

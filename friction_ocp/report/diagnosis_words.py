@@ -29,14 +29,23 @@ def diagnosis_sentence(result: Json) -> str:
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
             cause = "The cause is probably another."
-            return f"There is a gap beyond the noise; {where}, but {doubt}. {cause}{_cut_short(result)}"
+            told = f"There is a gap beyond the noise; {where}, but {doubt}."
+            return f"{told}{_predicted(result) or f' {cause}'}{_cut_short(result)}"
         case _ if accepted:
             found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
             left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
-            return f"{found}; {left}{_stand_ins(result)}.{_cut_short(result)}"
+            return f"{found}; {left}{_stand_ins(result)}.{_predicted(result)}{_cut_short(result)}"
         case _:
             told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
             return f"{told}{_cut_short(result)}"
+
+
+def _predicted(result: Json) -> str:
+    """Say that models were compared by short predictions, and what that leaves open."""
+    if not result.get("by_predictions"):
+        return ""
+    why = "The simulation strays so far from the recordings that models were compared by short predictions"
+    return f" {why} from the measured motion; errors of that motion are part of what is left."
 
 
 def _cut_short(result: Json) -> str:
