@@ -23,7 +23,7 @@ from friction_ocp.friction.composite import Bend, StribeckRise, added_terms, pla
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip
 from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Viscous
-from friction_ocp.parameters import Directional, Free, Tie
+from friction_ocp.parameters import Directional, Free, Tie, Value
 
 SHARE = 0.05
 """Size of a trial over the torque that moves the shaft: small, yet far above rounding."""
@@ -154,10 +154,10 @@ class QuadraticDragEffect(AbstractEffect):
 
 
 class AsymmetryEffect(AbstractEffect):
-    """Coulomb or viscous friction differs by direction."""
+    """Coulomb or viscous friction differs by direction, and how far it rises near standstill where the law has that."""
 
     name: ClassVar[str] = "asymmetry"
-    sentence: ClassVar[str] = "Coulomb or viscous friction differs by direction"
+    sentence: ClassVar[str] = "Coulomb, viscous or breakaway friction differs by direction"
 
     def places(self, drive: Drive) -> Iterable[str]:
         for shaft in moving_shafts(drive):
@@ -174,10 +174,21 @@ class AsymmetryEffect(AbstractEffect):
         sizes = {"coulomb": size} if is_dry(shaft) else {}
         if viscous_part(shaft.friction.law) is not None or isinstance(plain_law(shaft.friction.law), Polyline):
             sizes["viscous"] = slope
-        terms = {key: _odd(f"{stem}.{key}.positive", value) for key, value in sizes.items()}
+        terms: dict[str, Any] = {key: _odd(f"{stem}.{key}.positive", value) for key, value in sizes.items()}
         paths = {f"{stem}.{key}.positive": value for key, value in sizes.items()}
+        law = plain_law(shaft.friction.law)
+        if hasattr(law, "tau_s"):
+            path = f"{stem}.stribeck.torque.positive"
+            shape = {name: _shared(getattr(law, name), f"{place}.friction.{name}") for name in ("omega_s", "delta")}
+            terms["stribeck"] = StribeckRise(_odd(path, size), **shape)
+            paths[path] = size
         trial = Trial(tuple({path: value} for path, value in paths.items()))
         return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(paths, 0.0), (trial,))
+
+
+def _shared(value: Value, path: str) -> Value:
+    """Return a number that is what another one is, wherever that is fitted."""
+    return Tie(path) if isinstance(value, Free) else value
 
 
 def _odd(path: str, size: float) -> Directional:
