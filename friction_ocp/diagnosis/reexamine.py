@@ -22,7 +22,7 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, gave_shape, resamples, schwarz, turned
-from friction_ocp.diagnosis.worth import OF_ALL, Key, may_grow, required, samples
+from friction_ocp.diagnosis.worth import ALMOST, OF_ALL, Key, may_grow, required, samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.execution.run import run_tasks
@@ -77,15 +77,18 @@ def without_small(bench: Bench, accepted: list[Key]) -> tuple[FittedModel, list[
     """Drop additions, the latest first, without which little more of the whole gap is left; one stays.
 
     For where more than noise is left at the end. A small addition is one for what it does to the rest: two effects of
-    which one is small leave nothing. Beside something unknown the rest is what stand-ins for it leave, whose shape is
-    not quite that of the machine, and what explains that is no further effect.
+    which one is small leave next to nothing, and what takes almost all that is left without it stays. Beside something
+    unknown the rest is what stand-ins for it leave, whose shape is not quite that of the machine, and what explains a
+    part of that is no further effect.
     """
     current = bench.current
     least = OF_ALL * (bench.base.cost - 0.5 * samples(bench.base))
     for key in reversed(dict.fromkeys(accepted)):
         kept = _less(accepted, key)
         simpler = without_addition(current, _drive(bench, kept)) if kept else None
-        if simpler is not None and simpler.holds and simpler.cost - current.cost < least:
+        if simpler is None or not simpler.holds:
+            continue
+        if simpler.cost - current.cost < min(least, ALMOST * (simpler.cost - 0.5 * samples(simpler))):
             current, accepted = simpler, kept
     return current, accepted
 

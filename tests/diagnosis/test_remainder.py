@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.worth import Key
 SAMPLES = 1000
 NOISE = 0.5 * SAMPLES
 STAND_IN, OTHER, SMALL = ("asymmetry", "motor"), ("sensor_offset", "position"), ("position_ripple", "motor")
+LARGE, LAST, HALF = ("stribeck", "motor"), ("cogging", "motor"), ("warm_up", "motor")
 COSTS: dict[tuple[Key, ...], float] = {
     (): 10_000.0,
     (STAND_IN,): 6000.0,
@@ -25,6 +26,11 @@ COSTS: dict[tuple[Key, ...], float] = {
     (STAND_IN, SMALL): 5500.0,
     (OTHER, SMALL): 7000.0,
     (STAND_IN, OTHER, SMALL): 1000.0,
+    (LARGE,): 900.0,
+    (LAST,): 9500.0,
+    (HALF,): 9500.0,
+    (LARGE, LAST): 60.0,
+    (LARGE, HALF): 450.0,
 }
 """What is left beside additions, noise included."""
 
@@ -59,6 +65,12 @@ def test_beside_something_unknown_a_small_part_of_the_gap_is_no_effect(monkeypat
 def test_what_takes_a_large_part_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of the two takes more than a tenth of all beside the other."""
     assert kept(monkeypatch, STAND_IN, OTHER) == [STAND_IN, OTHER]
+
+
+def test_what_takes_almost_all_that_a_large_one_leaves_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Be it less than a tenth of the whole gap, and a little more than noise left beside both."""
+    assert kept(monkeypatch, LARGE, LAST) == [LARGE, LAST]
+    assert kept(monkeypatch, LARGE, HALF) == [LARGE]
 
 
 def test_what_is_alone_stands(monkeypatch: pytest.MonkeyPatch) -> None:
