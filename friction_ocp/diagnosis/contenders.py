@@ -43,7 +43,8 @@ def to_refit(
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
     joined segments do, where both are judged by squares and the best is no work of chance, but for what promises most
-    of free runs: short segments may not show it.
+    of free runs: short segments may not show it. And for what one of those has and more: a fit may have come to rest on
+    its way, and of the two the plain one is to be preferred.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if not chosen or not current.astray:
@@ -57,7 +58,8 @@ def to_refit(
             return tried, []
         leading = _leading(tried, crew.fitted_loosely(tried), samples(current))
         most = [item.key for item in first[:1]]
-        return _and(leading, [item for item in tried if item.key in most]), []
+        leading = _and(leading, [item for item in tried if item.key in most])
+        return _and(leading, [item for item in tried if any(other.holds(item) for other in leading)]), []
     unfitted = _promising(crew.screened_unfitted(keys))
     return _and(with_resembling(chosen, found, astray=True), outright), _and(unfitted, outright)
 

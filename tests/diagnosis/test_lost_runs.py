@@ -155,6 +155,31 @@ def test_fits_of_loosely_joined_segments_choose_what_lost_runs_are_refitted_with
     assert unfitted == []
 
 
+def test_what_a_more_general_effect_has_is_refitted_beside_it() -> None:
+    """An offset beside the eccentricity that has one, however its fit of loosely joined segments ended."""
+    offset = candidate("sensor_offset", 1.0, gain=8.0)
+    whole = candidate("sensor_eccentricity", 1.0, gain=9.0)
+    whole = replace(whole, augmentation=replace(whole.augmentation, off={"size": 0.0, "cosine": 0.0}))
+    others = [candidate("cogging", 1.0), candidate("unbalance", 1.0)]
+    others = [replace(item, augmentation=replace(item.augmentation, off={item.effect: 0.0})) for item in others]
+    linear = SimpleNamespace(rows=SimpleNamespace(channel=np.zeros(1000), residual=np.ones(1000)))
+    bench = SimpleNamespace(current=SimpleNamespace(lost=True, leads_loosely=True, astray=True, linear=linear))
+    gains = {"sensor_eccentricity": 10.0, "cogging": 90.0, "unbalance": 80.0, "sensor_offset": 20.0}
+
+    def screened_loosely(keys: list[Key]) -> list[Screened]:
+        return []
+
+    def fitted_loosely(candidates: list[Screened]) -> list[float]:
+        return [gains[item.effect] for item in candidates]
+
+    crew = SimpleNamespace(bench=bench, screened_loosely=screened_loosely, fitted_loosely=fitted_loosely)
+    tried = [whole, offset, *others]
+    chosen, _ = to_refit(cast(Any, crew), tried, tried)
+    assert {item.effect for item in chosen} == {*gains}
+    kept, _ = to_refit(cast(Any, crew), tried[2:] + tried[1:2], tried)
+    assert {item.effect for item in kept} == {"cogging", "unbalance"}
+
+
 def test_what_promises_nothing_while_small_is_tried_where_a_model_has_gone_astray() -> None:
     """From where the parameters are and from the guesses; not where the model is near the recordings."""
     stiffening, play = candidate("stiffening", 1.0, gain=9.0), candidate("backlash", gain=0.0)
