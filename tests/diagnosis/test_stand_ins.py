@@ -38,7 +38,9 @@ def test_an_addition_has_to_help_free_runs_too(
 ) -> None:
     """What helps from sample to sample alone is taken back, unless free runs can say nothing or noise moves them."""
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
-    base, current = SimpleNamespace(cost=100.0), SimpleNamespace(cost=100.0 * (1.0 - taken), model=model)
+    foot = SimpleNamespace(predicted=False)
+    base = SimpleNamespace(cost=100.0)
+    current = SimpleNamespace(cost=100.0 * (1.0 - taken), model=model, footing=foot)
     power = SimpleNamespace(significant=lambda level: not noise)
     monkeypatch.setattr(stand_ins, "innovations", lambda fitted: power)
     monkeypatch.setattr(stand_ins, "samples", lambda fitted: 0)

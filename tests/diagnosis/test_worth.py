@@ -50,7 +50,8 @@ def drifting(power: float, beyond: float, seed: int, drift: float = 0.0) -> Fitt
     free = FreeErrors((run,), ("position",), np.ones(1), blocks, np.full((24, 1), 100.0), np.array([drift]))
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
     linear = SimpleNamespace(rows=SimpleNamespace(recording=np.zeros(1), static=()))
-    return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear))
+    foot = SimpleNamespace(predicted=False)
+    return cast(FittedModel, SimpleNamespace(free=free, beyond=beyond, model=model, linear=linear, footing=foot))
 
 
 @pytest.fixture
