@@ -201,30 +201,30 @@ def open_bench(problem: Problem, execution: Execution) -> Bench:
     """
     workshop, task = Workshop(problem), Task("base", fit_base_model)
     with_one = run_tasks("base model", [task], workshop, workshop.fingerprint, InProcess(), execution.ledger)
-    found = value_of(with_one["base"])
-    bench = Bench(problem, found["footing"], found["point"], Seat(problem.drive, found["point"]))
+    bench = _bench_of(problem, value_of(with_one["base"]))
     noise = not innovations(bench.current).significant(level_of(problem))
     return bench if noise else opened_better(bench, execution)
 
 
 def open_predicting(bench: Bench, execution: Execution) -> Bench:
     """Return the bench of a base model that is compared with others by short predictions from the measured motion."""
-    outcomes = run_tasks(
-        "base model by short predictions",
-        [Task("base-predicting", fit_predicting)],
-        bench,
-        bench.fingerprint,
-        execution.executor,
-        execution.ledger,
-    )
-    found = value_of(outcomes["base-predicting"])
-    return Bench(bench.problem, found["footing"], found["point"], Seat(bench.problem.drive, found["point"]))
+    what, task = "base model by short predictions", Task("base-predicting", fit_predicting)
+    found = run_tasks(what, [task], bench, bench.fingerprint, execution.executor, execution.ledger)
+    return _bench_of(bench.problem, value_of(found[task.key]))
 
 
 def fit_predicting(bench: Bench) -> Json:
     """Fit the base model to short predictions; the value says where it stands."""
-    fitted = predicting(bench.base)
-    return {"footing": footing_document(fitted.footing), "point": point_document(fitted)}
+    return _base_document(predicting(bench.base))
+
+
+def _base_document(base: FittedModel) -> Json:
+    return {"footing": footing_document(base.footing), "point": point_document(base)}
+
+
+def _bench_of(problem: Problem, base: Json) -> Bench:
+    """Return the bench of a base model that stands where `_base_document` says."""
+    return Bench(problem, base["footing"], base["point"], Seat(problem.drive, base["point"]))
 
 
 def opened_better(bench: Bench, execution: Execution) -> Bench:
@@ -274,8 +274,7 @@ def _better_point(fitted: FittedModel) -> Json:
 
 def fit_base_model(workshop: Workshop) -> Json:
     """Fit the base model from its guesses; the value says where it stands."""
-    fitted = fit_base(prepare(workshop.problem))
-    return {"footing": footing_document(fitted.footing), "point": point_document(fitted)}
+    return _base_document(fit_base(prepare(workshop.problem)))
 
 
 def value_of(outcome: Outcome) -> Json:

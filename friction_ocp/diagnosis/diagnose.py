@@ -229,9 +229,8 @@ def _diagnosed(
 
 def _by_predictions(search: Search, run: Execution) -> Search:
     """Look for additions by short predictions where nothing leads on; return the search that found some."""
-    patience = max(search.patience - search.effort * search.patience, LEAST_SHARE * search.patience)
-    bench = open_predicting(search.bench.at(search.bench.base), run)
-    other = Search(bench, run, search.meant, search.level, search.tell, patience)
+    patience = search.patience * max(1.0 - search.effort, LEAST_SHARE)
+    other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
     other.go()
     return other if other.accepted else search
 

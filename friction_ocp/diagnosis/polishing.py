@@ -51,6 +51,8 @@ def polished(
 def begun(program: Program, theta: FloatArray) -> Point:
     """Return parameters with the nodes that fit them best."""
     point = solve_nodes(program, program.suggested_point(theta))
+    if program.without_nodes:
+        return point
     return joined(program, settled(program, point))
 
 

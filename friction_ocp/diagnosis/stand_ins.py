@@ -31,15 +31,14 @@ def helps(
     what takes almost all, yet not all, no more than that something else is missing. Where models are compared by short
     predictions free runs go astray whatever is added, and are not asked.
     """
-    if current.footing.predicted:
-        return base.cost - current.cost >= PART * (base.cost - 0.5 * samples(base))
-    if not innovations(current).significant(level):
+    predicted = current.footing.predicted
+    if not predicted and not innovations(current).significant(level):
         before, after = left_out()
         return before.lost or after.drowned or after.excess() <= max(DOUBTED - 1.0, (1.0 - PART) * before.excess())
     taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
     if taken < PART * whole:
         return False
-    if 0.0 < ALMOST * whole <= taken:
+    if predicted or 0.0 < ALMOST * whole <= taken:
         return True
     before, after = left_out()
     if before.lost or after.drowned:

@@ -140,16 +140,15 @@ class Standard:
         addition. Where models are compared by short predictions free runs go astray whatever is added, and are not
         asked.
         """
+        one_step = (self._beyond, innovations(fitted).beyond)
+        most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if self.current.footing.predicted:
-            one, other = self._beyond, innovations(fitted).beyond
-            return other <= (1.0 - OF_REST) * one and one - other > MATERIAL * (1.0 + other)
+            return most and _beyond_doubt(*one_step)
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
-        one_step = (self._beyond, innovations(fitted).beyond)
         all_of_it = comes_closer(before, after, seed) and after.excess() <= (1.0 - ALONE) * before.excess()
         if not self.silent or one_step[0] > DOUBTED - 1.0 or all_of_it:
             pairs.append((before.excess(), after.excess()))
-        most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
         if after.drowned:
             told = most
         elif before.lost:
@@ -162,7 +161,12 @@ class Standard:
             told = most and after.excess() <= (1.0 + MATERIAL) * before.excess()
         if told:
             pairs.append(one_step)
-        return any(one - other > MATERIAL * (1.0 + other) for one, other in pairs)
+        return any(_beyond_doubt(one, other) for one, other in pairs)
+
+
+def _beyond_doubt(before: float, after: float) -> bool:
+    """Whether an excess falls by more than the floors are in doubt by."""
+    return before - after > MATERIAL * (1.0 + after)
 
 
 def innovations(fitted: FittedModel) -> Excess:
