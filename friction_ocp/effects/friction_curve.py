@@ -19,11 +19,12 @@ from friction_ocp.effects.effect import (
     moving_shafts,
     upwards,
 )
+from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.composite import Bend, StribeckRise, added_terms, plain_law, viscous_part, with_added
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip
-from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Viscous
-from friction_ocp.parameters import Directional, Free, Tie, Value
+from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Stribeck, Viscous
+from friction_ocp.parameters import Directional, Free, Tie, Value, is_off
 
 SHARE = 0.05
 """Size of a trial over the torque that moves the shaft: small, yet far above rounding."""
@@ -36,6 +37,10 @@ takes 1, Armstrong-Helouvry 1991 takes 2."""
 
 TAIL = 0.3
 """Tail of a Stribeck curve that is tried, a third of Hess & Soom's."""
+
+
+UNEVEN, MOST_UNEVEN = 0.1, 0.9
+"""Share by which friction near standstill differs from its mean over both directions: tried, and at most."""
 
 
 def with_friction(drive: Drive, shaft: Shaft, **terms: Any) -> Drive:
@@ -154,7 +159,7 @@ class QuadraticDragEffect(AbstractEffect):
 
 
 class AsymmetryEffect(AbstractEffect):
-    """Coulomb or viscous friction differs by direction, and how far it rises near standstill where the law has that."""
+    """Friction differs by direction: Coulomb, viscous, and near standstill whatever the law has there."""
 
     name: ClassVar[str] = "asymmetry"
     sentence: ClassVar[str] = "Coulomb, viscous or breakaway friction differs by direction"
@@ -170,27 +175,41 @@ class AsymmetryEffect(AbstractEffect):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         shaft, stem = drive.shaft(place), f"{place}.friction.added"
         size = SHARE * clues.typical_torque[place]
-        slope = size / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12)
-        sizes = {"coulomb": size} if is_dry(shaft) else {}
-        if viscous_part(shaft.friction.law) is not None or isinstance(plain_law(shaft.friction.law), Polyline):
-            sizes["viscous"] = slope
-        terms: dict[str, Any] = {key: _odd(f"{stem}.{key}.positive", value) for key, value in sizes.items()}
-        paths = {f"{stem}.{key}.positive": value for key, value in sizes.items()}
-        law = plain_law(shaft.friction.law)
-        if hasattr(law, "tau_s"):
+        whole, law = shaft.friction.law, plain_law(shaft.friction.law)
+        sizes = {"coulomb": either_way(size)} if is_dry(shaft) else {}
+        if viscous_part(whole) is not None or isinstance(law, Polyline):
+            sizes["viscous"] = either_way(size / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12))
+        sizes |= {name: Free(UNEVEN, -MOST_UNEVEN, MOST_UNEVEN) for name in _near_standstill(whole)}
+        terms: dict[str, Any] = {name: _odd(f"{stem}.{name}.positive", value) for name, value in sizes.items()}
+        guesses = {f"{stem}.{name}.positive": value.guess for name, value in sizes.items()}
+        if isinstance(law, (LuGre, Stribeck)):
             path = f"{stem}.stribeck.torque.positive"
-            shape = {name: _shared(getattr(law, name), f"{place}.friction.{name}") for name in ("omega_s", "delta")}
-            terms["stribeck"] = StribeckRise(_odd(path, size), **shape)
-            paths[path] = size
-        trial = Trial(tuple({path: value} for path, value in paths.items()))
-        return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(paths, 0.0), (trial,))
+            delta = _shared(law.delta, f"{place}.friction.delta")
+            speed = _either(law.omega_s, f"{place}.friction.omega_s", f"{stem}.omega_s.positive")
+            terms["stribeck"], guesses[path] = StribeckRise(_odd(path, either_way(size)), speed, delta), size
+        trial = Trial(tuple({path: guess} for path, guess in guesses.items()))
+        return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(guesses, 0.0), (trial,))
+
+
+def _near_standstill(law: AbstractFrictionLaw) -> list[str]:
+    """Return the numbers of a law's curve and bristle near standstill that may be larger one way by a share."""
+    names = ["omega_s"] if hasattr(plain_law(law), "omega_s") else []
+    if law.has_bristle:
+        names += [name for name in ("sigma0", "sigma1") if not is_off(getattr(law, name))]
+    return names
 
 
 def _shared(value: Value, path: str) -> Value:
     """Return a number that is what another one is, wherever that is fitted."""
-    return Tie(path) if isinstance(value, Free) else value
+    return Tie(path) if isinstance(value, (Free, Tie)) else value
 
 
-def _odd(path: str, size: float) -> Directional:
+def _either(value: Value, path: str, share: str) -> Directional:
+    """Return a number, named by its path or plain, that is larger one way by a fitted share and smaller the other."""
+    name = path if isinstance(value, (Free, Tie)) else repr(float(value))
+    return Directional(Tie(f"{name} * (1 + {share})"), Tie(f"{name} * (1 - {share})"))
+
+
+def _odd(path: str, size: Free) -> Directional:
     """Return a term that is added in one direction and taken off in the other."""
-    return Directional(either_way(size), Tie(f"-1 * {path}"))
+    return Directional(size, Tie(f"-1 * {path}"))

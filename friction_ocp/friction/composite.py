@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from friction_ocp.friction.bristle import AbstractBristleLaw
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.smoothing import positive_part
 from friction_ocp.friction.static import stribeck_share
 from friction_ocp.parameters import Value, inline, quantity
+
+Law = TypeVar("Law", bound=AbstractFrictionLaw)
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,17 @@ class Bend:
 
 @dataclass(frozen=True)
 class AddedFriction:
-    """Terms that are added to the magnitude of a law; any of them may differ by direction."""
+    """Terms that are added to the magnitude of a law, and shares that its own numbers are larger by.
+
+    Any of them may differ by direction.
+    """
 
     coulomb: Value = quantity("torque", "added Coulomb friction", None)
     viscous: Value = quantity("viscous", "added viscous friction", None)
     quadratic: Value = quantity("quadratic", "added quadratic friction", None)
+    omega_s: Value = quantity("dimensionless", "share by which the Stribeck speed is larger", None, nested=0.0)
+    sigma0: Value = quantity("dimensionless", "share by which the bristle is stiffer", None)
+    sigma1: Value = quantity("dimensionless", "share by which the bristle's damping is larger", None)
     stribeck: StribeckRise | None = None
     bend: Bend | None = None
 
@@ -64,6 +72,17 @@ class AddedFriction:
             torque = torque if part is None else torque + part.torque_at(speed)
         return torque
 
+    def grown(self, name: str, value: Any) -> Any:
+        """Return a number of the law, `value`, larger by the share of its name."""
+        share = getattr(self, name)
+        return value if share is None else value * (1.0 + share)
+
+    def changed(self, law: Law) -> Law:
+        """Return the law with the Stribeck speed that it has beside these terms."""
+        if self.omega_s is None:
+            return law
+        return replace(law, omega_s=self.grown("omega_s", getattr(law, "omega_s")))  # noqa: B009
+
 
 @dataclass(frozen=True)
 class Sum(AbstractFrictionLaw):
@@ -74,10 +93,10 @@ class Sum(AbstractFrictionLaw):
     name: ClassVar[str] = "sum"
 
     def magnitude(self, speed: Any) -> Any:
-        return self.law.magnitude(speed) + self.added.torque_at(speed)
+        return self.added.changed(self.law).magnitude(speed) + self.added.torque_at(speed)
 
     def weakening(self, speed: Any) -> Any:
-        return self.law.weakening(speed)
+        return self.added.changed(self.law).weakening(speed)
 
 
 @dataclass(frozen=True)
@@ -91,12 +110,12 @@ class BristleSum(AbstractBristleLaw):
     @property
     def sigma0(self) -> Any:
         """Bristle stiffness."""
-        return getattr(self.law, "sigma0")  # noqa: B009
+        return self.added.grown("sigma0", getattr(self.law, "sigma0"))  # noqa: B009
 
     @property
     def sigma1(self) -> Any:
         """Bristle damping."""
-        return getattr(self.law, "sigma1")  # noqa: B009
+        return self.added.grown("sigma1", getattr(self.law, "sigma1"))  # noqa: B009
 
     @property
     def sigma2(self) -> Any:
@@ -104,10 +123,10 @@ class BristleSum(AbstractBristleLaw):
         return getattr(self.law, "sigma2")  # noqa: B009
 
     def level(self, speed: Any) -> Any:
-        return self.law.level(speed) + self.added.torque_at(speed)
+        return self.added.changed(self.law).level(speed) + self.added.torque_at(speed)
 
     def weakening(self, speed: Any) -> Any:
-        return self.law.weakening(speed)
+        return self.added.changed(self.law).weakening(speed)
 
 
 @dataclass(frozen=True)
@@ -132,12 +151,16 @@ class Bristled(AbstractBristleLaw):
     @property
     def sigma0(self) -> Any:
         """Bristle stiffness."""
-        return self.bristle.sigma0
+        return self._grown("sigma0")
 
     @property
     def sigma1(self) -> Any:
         """Bristle damping."""
-        return self.bristle.sigma1
+        return self._grown("sigma1")
+
+    def _grown(self, name: str) -> Any:
+        terms, value = added_terms(self.law), getattr(self.bristle, name)
+        return value if terms is None else terms.grown(name, value)
 
     @property
     def sigma2(self) -> Any:

@@ -57,17 +57,21 @@ class BendSection(Section):
 
 
 class AddedSection(Section):
-    """Terms added to a law."""
+    """Terms added to a law, and shares that its own numbers are larger by."""
 
     coulomb: FrictionNumber = None
     viscous: FrictionNumber = None
     quadratic: FrictionNumber = None
+    omega_s: FrictionNumber = None
+    sigma0: FrictionNumber = None
+    sigma1: FrictionNumber = None
     stribeck: StribeckRiseSection | None = None
     bend: BendSection | None = None
 
     def build(self) -> dict[str, Any]:
         """Return the terms by name."""
-        terms = dict(given(self, "coulomb", "viscous", "quadratic"))
+        plain = (name for name in type(self).model_fields if name not in ("stribeck", "bend"))
+        terms = dict(given(self, *plain))
         if self.stribeck is not None:
             terms["stribeck"] = StribeckRise(**given(self.stribeck, *StribeckRiseSection.model_fields))
         if self.bend is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, write_case
@@ -12,7 +13,8 @@ from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.executor import InProcess
-from friction_ocp.friction.composite import StribeckRise, added_terms
+from friction_ocp.friction.bristle import LuGre
+from friction_ocp.friction.composite import StribeckRise, added_terms, with_added
 from friction_ocp.parameters import Directional, Tie
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
@@ -39,7 +41,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_the_rise_near_standstill_differs_where_the_law_has_one(path: Path) -> None:
-    """Its speed is that of the law, and what is added forward is taken off backward."""
+    """What is added forward is taken off backward; the speed of the law differs by a share that has no unit."""
     bench = open_bench(load_problem(path), Execution(InProcess()))
     found = effects()["asymmetry"].addition(bench.problem.drive, "motor", bench.clues)
     terms = added_terms(found.drive.shaft("motor").friction.law)
@@ -47,9 +49,11 @@ def test_the_rise_near_standstill_differs_where_the_law_has_one(path: Path) -> N
     rise = terms.stribeck
     assert isinstance(rise, StribeckRise)
     assert isinstance(rise.torque, Directional)
-    assert rise.omega_s == Tie("motor.friction.omega_s")
+    share = "motor.friction.added.omega_s.positive"
+    assert rise.omega_s == Directional(*(Tie(f"motor.friction.omega_s * (1 {sign} {share})") for sign in "+-"))
     assert rise.torque.negative == Tie("-1 * motor.friction.added.stribeck.torque.positive")
-    assert set(found.off) == {f"motor.friction.added.{x}.positive" for x in ("coulomb", "viscous", "stribeck.torque")}
+    names = ("coulomb", "viscous", "omega_s", "stribeck.torque")
+    assert set(found.off) == {f"motor.friction.added.{name}.positive" for name in names}
 
 
 def test_a_law_without_a_rise_gets_none(tmp_path: Path) -> None:
@@ -59,6 +63,40 @@ def test_a_law_without_a_rise_gets_none(tmp_path: Path) -> None:
     terms = added_terms(found.drive.shaft("motor").friction.law)
     assert terms is not None
     assert terms.stribeck is None
+
+
+def test_a_law_of_two_directions_is_what_its_mean_and_differences_make(path: Path) -> None:
+    """Breakaway, Stribeck speed, bristle stiffness and damping of each direction come out as they were put in."""
+    sides = {
+        "tau_c": (0.2, 0.3),
+        "tau_s": (0.5, 0.4),
+        "omega_s": (2.0, 3.0),
+        "sigma0": (90.0, 110.0),
+        "sigma1": (0.5, 0.6),
+        "sigma2": (0.01, 0.02),
+    }
+    mean = {name: 0.5 * sum(pair) for name, pair in sides.items()}
+    odd = {name: 0.5 * (pair[0] - pair[1]) for name, pair in sides.items()}
+    both = (1.0, -1.0)
+    speeds = Directional(*sides["omega_s"])
+    whole = with_added(
+        LuGre(**mean),
+        coulomb=Directional(*(sign * odd["tau_c"] for sign in both)),
+        viscous=Directional(*(sign * odd["sigma2"] for sign in both)),
+        stribeck=StribeckRise(Directional(*(sign * (odd["tau_s"] - odd["tau_c"]) for sign in both)), speeds),
+        **{
+            name: Directional(*(sign * odd[name] / mean[name] for sign in both))
+            for name in ("omega_s", "sigma0", "sigma1")
+        },
+    )
+    plain = LuGre(**{name: Directional(*pair) for name, pair in sides.items()})
+    for side in ("positive", "negative"):
+        one, other = whole.along(side), plain.along(side)
+        speed = np.array([0.0, 0.5, 2.0, 20.0])
+        np.testing.assert_allclose(one.magnitude(speed), other.magnitude(speed), rtol=1e-12)
+        np.testing.assert_allclose(one.weakening(speed), other.weakening(speed), rtol=1e-12)
+        for name in ("sigma0", "sigma1"):
+            assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-12)
 
 
 @pytest.mark.slow
