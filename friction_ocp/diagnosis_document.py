@@ -234,6 +234,7 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "significant": diagnosis.unexplained,
         "carries_over": diagnosis.carries_over,
+        "stray": diagnosis.stray,
         "component": component,
         "ratio": diagnosis.remainder.ratio,
         "slow_torque": slow,

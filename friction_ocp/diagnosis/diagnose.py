@@ -24,6 +24,7 @@ from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stated import STATED, contradictions, corrected
+from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.diagnosis.worth import Key, innovations
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
@@ -93,11 +94,21 @@ class Diagnosis:
         """Whether what was added shrinks the gap on recordings that took no part, or leaves nothing of it there.
 
         They take no part in choosing; but what helps where it was fitted alone explains nothing. Where only a stated
-        value was wrong, and the innovations showed no gap, there is none to shrink.
+        value was wrong, and the innovations showed no gap, there is none to shrink; where noise alone makes free runs
+        `stray` as far, they contradict nothing.
         """
+        return self._comes_closer or self.stray
+
+    @cached_property
+    def _comes_closer(self) -> bool:
         shown = any(item.excess.significant(self.level) for item in (*self.rounds, *self.superseded))
         shown |= any(effect not in STATED for effect, _ in self.accepted)
         return not (self.accepted and shown) or carries_over(self.before, self.after, self.problem.estimation.seed)
+
+    @cached_property
+    def stray(self) -> bool:
+        """Whether free runs come no closer, and noise alone sets runs of the final model as far apart."""
+        return not self._comes_closer and strays_as_far(self.final, self.after, self.problem.estimation.seed)
 
     @property
     def unexplained(self) -> bool:

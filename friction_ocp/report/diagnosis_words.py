@@ -21,10 +21,10 @@ def diagnosis_sentence(result: Json) -> str:
         case "no_gap":
             return "The model explains these recordings down to the noise: there is no gap to close."
         case "explained":
-            return f"The model lacked {_listed(accepted)}; with it {_closed(closed)}."
+            return f"The model lacked {_listed(accepted)}; with it {_closed(closed)}.{_stray(result)}"
         case "undecided":
             likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
-            return f"There is a gap, and several causes fit it: {likely}."
+            return f"There is a gap, and several causes fit it: {likely}.{_stray(result)}"
         case _ if accepted and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
@@ -46,6 +46,14 @@ def _predicted(result: Json) -> str:
         return ""
     why = "The simulation strays so far from the recordings that models were compared by short predictions"
     return f" {why} from the measured motion; errors of that motion are part of what is left."
+
+
+def _stray(result: Json) -> str:
+    """Say that free runs part by themselves, where they do not come closer."""
+    if not part(result, "remainder").get("stray"):
+        return ""
+    why = "noise of the start and of the inputs alone sets simulations of this drive as far apart"
+    return f" Free runs say little here: {why}, and the errors from sample to sample were judged."
 
 
 def _cut_short(result: Json) -> str:

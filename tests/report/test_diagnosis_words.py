@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from friction_ocp.report.diagnosis_words import (
     alias_sentences,
     blind_spot_sentences,
@@ -79,6 +81,14 @@ def test_what_does_not_carry_over_is_no_part() -> None:
     assert "explains part of it where the model was fitted, but not on recordings left out" in said
     assert said.endswith("The cause is probably another.")
     assert "what is left" not in said
+
+
+@pytest.mark.parametrize("verdict", ["explained", "undecided"])
+def test_free_runs_that_part_by_themselves_are_told(verdict: str) -> None:
+    """They come no closer, and noise alone sets them as far apart."""
+    for stray in (True, False):
+        said = diagnosis_sentence(result(verdict, accepted=[COGGING], remainder={"significant": False, "stray": stray}))
+        assert ("Free runs say little here" in said) is stray
 
 
 def test_additions_that_were_taken_back_are_told_once_with_the_reason() -> None:

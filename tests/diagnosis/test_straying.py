@@ -1,0 +1,66 @@
+"""Free runs of a drive that noise alone sets as far apart as they err."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import aries
+import pytest
+import yaml
+from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, diagnosed, write_case
+
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.free_gap import free_errors
+from friction_ocp.diagnosis.straying import strays_as_far
+from friction_ocp.estimation.model import prepare
+from friction_ocp.problem_file.load import load_problem
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "problems" / "benchmarks"))
+import gaps
+
+RISE = {"law": "stribeck", "tau_s": 0.3, "omega_s": 0.5}
+
+
+def test_what_a_model_lacks_is_more_than_noise_makes_of_free_runs(tmp_path: Path) -> None:
+    """Runs of a model without the Stribeck friction of its plant err by far more than noise sets them apart."""
+    fitted = fit_base(prepare(load_problem(write_case(tmp_path, axis(**RISE)))))
+    errors = free_errors(fitted, held_out=True)
+    assert errors.excess() > 10.0
+    assert not strays_as_far(fitted, errors, 0)
+
+
+def test_what_noise_makes_of_free_runs_is_the_bound(tmp_path: Path) -> None:
+    """A model of the kind of its plant errs no more than that; errors of a thousand times the power are more."""
+    path = write_case(tmp_path, axis(**RISE))
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["friction"] = {
+        "law": "stribeck",
+        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
+        "tau_s": {"guess": OFF * 0.3, "min": 0, "max": 2},
+        "omega_s": {"guess": OFF * 0.5, "min": 0.1, "max": 40},
+        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
+    }
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    fitted = fit_base(prepare(load_problem(path)))
+    errors = free_errors(fitted, held_out=True)
+    assert strays_as_far(fitted, errors, 0)
+    assert not strays_as_far(fitted, replace(errors, power=1e3 * errors.power), 0)
+
+
+@pytest.mark.slow
+def test_friction_by_direction_of_a_telescope_is_found_though_its_free_runs_part(tmp_path: Path) -> None:
+    """The axis is unstable where its friction falls; the mean over both directions comes out as that of its plant."""
+    found = diagnosed(gaps.aries_axis("asymmetry", tmp_path))
+    assert found["verdict"] == "explained"
+    assert [(item["effect"], item["component"]) for item in found["accepted"]] == [("asymmetry", "axis")]
+    assert found["remainder"]["stray"]
+    values = {name: item["value"] for name, item in found["accepted"][0]["parameters"].items()}
+    odd = {name: 0.5 * (pair[0] - pair[1]) for name, pair in aries.NUMBERS.items()}
+    mean = {name: 0.5 * sum(pair) for name, pair in aries.NUMBERS.items()}
+    stem = "axis.friction.added"
+    assert values[f"{stem}.coulomb.positive"] == pytest.approx(odd["tau_c"], rel=0.1)
+    assert values[f"{stem}.viscous.positive"] == pytest.approx(odd["viscous"], rel=0.1)
+    for name in ("omega_s", "sigma0"):
+        assert values[f"{stem}.{name}.positive"] == pytest.approx(odd[name] / mean[name], abs=0.03)
