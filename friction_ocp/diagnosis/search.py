@@ -43,9 +43,9 @@ from friction_ocp.statistics.execution import Execution
 MOST_ROUNDS = 4
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MOST_STEPS, MOST_RUNS = 1.5e9, 2900.0
+MOST_STEPS, MOST_RUNS = 2e9, 2900.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
-which nothing further is tried: about two minutes on two processors, and longer for logs of more than 100,000 steps."""
+which nothing further is tried: about two minutes on two processors, and longer for logs of more than 130,000 steps."""
 INSTEAD = 2
 """Other effects, nearest first, from which the search goes on where the first addition leads nowhere."""
 HOPE = 0.25
