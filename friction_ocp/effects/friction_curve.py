@@ -20,7 +20,15 @@ from friction_ocp.effects.effect import (
     upwards,
 )
 from friction_ocp.friction.bristle import LuGre
-from friction_ocp.friction.composite import Bend, StribeckRise, added_terms, plain_law, viscous_part, with_added
+from friction_ocp.friction.composite import (
+    Bend,
+    Bristled,
+    StribeckRise,
+    added_terms,
+    plain_law,
+    viscous_part,
+    with_added,
+)
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip
 from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Stribeck, Viscous
@@ -185,7 +193,9 @@ class AsymmetryEffect(AbstractEffect):
         if isinstance(law, (LuGre, Stribeck)):
             path = f"{stem}.stribeck.torque.positive"
             delta = _shared(law.delta, f"{place}.friction.delta")
-            speed = _either(law.omega_s, f"{place}.friction.omega_s", f"{stem}.omega_s.positive")
+            speed = _shared(law.omega_s, f"{place}.friction.omega_s")
+            if "omega_s" in sizes:
+                speed = _either(law.omega_s, f"{place}.friction.omega_s", f"{stem}.omega_s.positive")
             terms["stribeck"], guesses[path] = StribeckRise(_odd(path, either_way(size)), speed, delta), size
         trial = Trial(tuple({path: guess} for path, guess in guesses.items()))
         return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(guesses, 0.0), (trial,))
@@ -195,8 +205,9 @@ def _near_standstill(law: AbstractFrictionLaw) -> list[str]:
     """Return the numbers of a law's curve and bristle near standstill that may be larger one way by a share."""
     names = ["omega_s"] if hasattr(plain_law(law), "omega_s") else []
     if law.has_bristle:
-        names += [name for name in ("sigma0", "sigma1") if not is_off(getattr(law, name))]
-    return names
+        bristle = law.bristle if isinstance(law, Bristled) else plain_law(law)
+        names += [name for name in ("sigma0", "sigma1") if not is_off(getattr(bristle, name))]
+    return [name for name in names if lacks(law, name)]
 
 
 def _shared(value: Value, path: str) -> Value:

@@ -116,10 +116,21 @@ class FrictionSection(Section):
         whole: AbstractFrictionLaw = law(**{name: _built(value) for name, value in numbers.items()})
         if self.added is not None:
             whole = with_added(whole, **self.added.build())
+            self._refuse_shares_of_nothing(law)
         if self.bristle is not None and not law.has_bristle:
             whole = with_bristle(whole, Bristle(self.bristle.sigma0, self.bristle.sigma1))
         load = None if self.load is None else self.load.build()
         return FrictionElement(whole, load, self.ripple, self.warm_up)
+
+    def _refuse_shares_of_nothing(self, law: type[AbstractFrictionLaw]) -> None:
+        """Refuse shares that numbers are to be larger by which neither the law nor its bristle has."""
+        there = {field.name for field in dataclasses.fields(law)}
+        there |= set() if self.bristle is None else set(BristleSection.model_fields)
+        wrong = [name for name in ("omega_s", "sigma0", "sigma1") if getattr(self.added, name) is not None]
+        what, remedy = "a share of a number that this friction does not have", "leave it out or take another law"
+        faults = [Fault(("added", name), what, "", remedy) for name in wrong if name not in there]
+        if faults:
+            raise refuse("friction", faults)
 
 
 def read_friction(value: Any) -> FrictionElement:

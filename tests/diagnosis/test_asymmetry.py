@@ -65,6 +65,20 @@ def test_a_law_without_a_rise_gets_none(tmp_path: Path) -> None:
     assert terms.stribeck is None
 
 
+def test_a_share_that_a_law_has_already_stays(path: Path) -> None:
+    """It is no part of the addition."""
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["friction"]["added"] = {"omega_s": 0.1}
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    bench = open_bench(load_problem(path), Execution(InProcess()))
+    found = effects()["asymmetry"].addition(bench.problem.drive, "motor", bench.clues)
+    terms = added_terms(found.drive.shaft("motor").friction.law)
+    assert terms is not None and terms.stribeck is not None
+    assert terms.omega_s == 0.1
+    assert terms.stribeck.omega_s == Tie("motor.friction.omega_s")
+    assert "motor.friction.added.omega_s.positive" not in found.off
+
+
 def test_a_law_of_two_directions_is_what_its_mean_and_differences_make(path: Path) -> None:
     """Breakaway, Stribeck speed, bristle stiffness and damping of each direction come out as they were put in."""
     sides = {

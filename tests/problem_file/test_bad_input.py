@@ -152,6 +152,10 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put(f"{FRICTION}/tau_c", {"guess": 0.05, "min": 0.06, "max": 1}),
         "drive.shafts[0].friction.tau_c: guess = 0.05 N m is outside its bounds; 0.06 N m to 1 N m; move",
     ),
+    "a share of what the law does not have": (
+        put(FRICTION, {"law": "coulomb", "tau_c": 0.1, "added": {"omega_s": 0.1, "sigma0": 0.1}}),
+        "drive.shafts[0].friction.added.omega_s: a share of a number that this friction does not have; leave it out or",
+    ),
     "tau_s below tau_c": (
         put(f"{FRICTION}/tau_s", 0.03),
         "drive.shafts[0].friction: tau_s = 0.03 N m is below tau_c = 0.05 N m; breakaway must be >= Coulomb torque",
