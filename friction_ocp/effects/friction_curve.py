@@ -21,6 +21,7 @@ from friction_ocp.effects.effect import (
 )
 from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.composite import (
+    SHARES,
     Bend,
     Bristled,
     StribeckRise,
@@ -194,20 +195,18 @@ class AsymmetryEffect(AbstractEffect):
             path = f"{stem}.stribeck.torque.positive"
             delta = _shared(law.delta, f"{place}.friction.delta")
             speed = _shared(law.omega_s, f"{place}.friction.omega_s")
-            if "omega_s" in sizes:
-                speed = _either(law.omega_s, f"{place}.friction.omega_s", f"{stem}.omega_s.positive")
+            if "speed_share" in sizes:
+                speed = _either(law.omega_s, f"{place}.friction.omega_s", f"{stem}.speed_share.positive")
             terms["stribeck"], guesses[path] = StribeckRise(_odd(path, either_way(size)), speed, delta), size
         trial = Trial(tuple({path: guess} for path, guess in guesses.items()))
         return Augmentation(with_friction(drive, shaft, **terms), dict.fromkeys(guesses, 0.0), (trial,))
 
 
 def _near_standstill(law: AbstractFrictionLaw) -> list[str]:
-    """Return the numbers of a law's curve and bristle near standstill that may be larger one way by a share."""
-    names = ["omega_s"] if hasattr(plain_law(law), "omega_s") else []
-    if law.has_bristle:
-        bristle = law.bristle if isinstance(law, Bristled) else plain_law(law)
-        names += [name for name in ("sigma0", "sigma1") if not is_off(getattr(bristle, name))]
-    return [name for name in names if lacks(law, name)]
+    """Return the shares by which numbers of a law's curve and bristle near standstill may be larger one way."""
+    parts = [plain_law(law), *([law.bristle] if isinstance(law, Bristled) else [])]
+    there = [name for name in SHARES if any(not is_off(getattr(part, name, None)) for part in parts)]
+    return [SHARES[name] for name in there if lacks(law, SHARES[name])]
 
 
 def _shared(value: Value, path: str) -> Value:

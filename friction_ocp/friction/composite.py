@@ -13,6 +13,9 @@ from friction_ocp.parameters import Value, inline, quantity
 
 Law = TypeVar("Law", bound=AbstractFrictionLaw)
 
+SHARES = {"omega_s": "speed_share", "sigma0": "stiffness_share", "sigma1": "damping_share"}
+"""By number of a law, or of its bristle, what it may be larger by."""
+
 
 @dataclass(frozen=True)
 class StribeckRise:
@@ -56,9 +59,9 @@ class AddedFriction:
     coulomb: Value = quantity("torque", "added Coulomb friction", None)
     viscous: Value = quantity("viscous", "added viscous friction", None)
     quadratic: Value = quantity("quadratic", "added quadratic friction", None)
-    omega_s: Value = quantity("dimensionless", "share by which the Stribeck speed is larger", None, nested=0.0)
-    sigma0: Value = quantity("dimensionless", "share by which the bristle is stiffer", None)
-    sigma1: Value = quantity("dimensionless", "share by which the bristle's damping is larger", None)
+    speed_share: Value = quantity("dimensionless", "share by which the Stribeck speed is larger", None, nested=0.0)
+    stiffness_share: Value = quantity("dimensionless", "share by which the bristle is stiffer", None)
+    damping_share: Value = quantity("dimensionless", "share by which the bristle's damping is larger", None)
     stribeck: StribeckRise | None = None
     bend: Bend | None = None
 
@@ -73,13 +76,13 @@ class AddedFriction:
         return torque
 
     def grown(self, name: str, value: Any) -> Any:
-        """Return a number of the law, `value`, larger by the share of its name."""
-        share = getattr(self, name)
+        """Return a number of the law by its name, `value`, larger by its share."""
+        share = getattr(self, SHARES[name])
         return value if share is None else value * (1.0 + share)
 
     def changed(self, law: Law) -> Law:
         """Return the law with the Stribeck speed that it has beside these terms."""
-        if self.omega_s is None:
+        if self.speed_share is None:
             return law
         return replace(law, omega_s=self.grown("omega_s", getattr(law, "omega_s")))  # noqa: B009
 

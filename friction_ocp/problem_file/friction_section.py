@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, cast, get_args, get_origin, get_typ
 from pydantic import Field, create_model
 
 from friction_ocp.expressions import closest
-from friction_ocp.friction.composite import Bend, Bristle, StribeckRise, with_added, with_bristle
+from friction_ocp.friction.composite import SHARES, Bend, Bristle, StribeckRise, with_added, with_bristle
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.registry import friction_laws
@@ -62,9 +62,9 @@ class AddedSection(Section):
     coulomb: FrictionNumber = None
     viscous: FrictionNumber = None
     quadratic: FrictionNumber = None
-    omega_s: FrictionNumber = None
-    sigma0: FrictionNumber = None
-    sigma1: FrictionNumber = None
+    speed_share: FrictionNumber = None
+    stiffness_share: FrictionNumber = None
+    damping_share: FrictionNumber = None
     stribeck: StribeckRiseSection | None = None
     bend: BendSection | None = None
 
@@ -126,9 +126,12 @@ class FrictionSection(Section):
         """Refuse shares that numbers are to be larger by which neither the law nor its bristle has."""
         there = {field.name for field in dataclasses.fields(law)}
         there |= set() if self.bristle is None else set(BristleSection.model_fields)
-        wrong = [name for name in ("omega_s", "sigma0", "sigma1") if getattr(self.added, name) is not None]
-        what, remedy = "a share of a number that this friction does not have", "leave it out or take another law"
-        faults = [Fault(("added", name), what, "", remedy) for name in wrong if name not in there]
+        remedy = "leave it out or take another law"
+        faults = [
+            Fault(("added", share), f"this friction has no {name} to be larger by a share", "", remedy)
+            for name, share in SHARES.items()
+            if getattr(self.added, share) is not None and name not in there
+        ]
         if faults:
             raise refuse("friction", faults)
 

@@ -11,12 +11,14 @@ from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
+from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.friction.bristle import LuGre
-from friction_ocp.friction.composite import StribeckRise, added_terms, with_added
+from friction_ocp.friction.composite import SHARES, StribeckRise, added_terms, with_added
 from friction_ocp.parameters import Directional, Tie
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.problem_file.write import write_problem
 from friction_ocp.statistics.execution import Execution
 
 BREAKAWAY, SPEED = (0.30, 0.18), 4.0
@@ -49,10 +51,10 @@ def test_the_rise_near_standstill_differs_where_the_law_has_one(path: Path) -> N
     rise = terms.stribeck
     assert isinstance(rise, StribeckRise)
     assert isinstance(rise.torque, Directional)
-    share = "motor.friction.added.omega_s.positive"
+    share = "motor.friction.added.speed_share.positive"
     assert rise.omega_s == Directional(*(Tie(f"motor.friction.omega_s * (1 {sign} {share})") for sign in "+-"))
     assert rise.torque.negative == Tie("-1 * motor.friction.added.stribeck.torque.positive")
-    names = ("coulomb", "viscous", "omega_s", "stribeck.torque")
+    names = ("coulomb", "viscous", "speed_share", "stribeck.torque")
     assert set(found.off) == {f"motor.friction.added.{name}.positive" for name in names}
 
 
@@ -65,18 +67,30 @@ def test_a_law_without_a_rise_gets_none(tmp_path: Path) -> None:
     assert terms.stribeck is None
 
 
+def test_what_it_adds_is_read_back_from_a_problem_file(path: Path) -> None:
+    """Shares have either sign, and their names are none of those that must be positive."""
+    bench = open_bench(load_problem(path), Execution(InProcess()))
+    drive = effects()["asymmetry"].addition(bench.problem.drive, "motor", bench.clues).drive
+    values = {f"motor.friction.added.{name}.positive": -0.1 for name in ("coulomb", "speed_share", "stribeck.torque")}
+    written = path.with_name("augmented.yaml")
+    written.write_text(write_problem(path, drive, values, path.parent), encoding="utf-8")
+    read = {leaf.path: leaf.value for leaf in drive_leaves(load_problem(written).drive)}
+    assert {name: read[name].guess for name in values} == values
+    assert read["motor.friction.added.speed_share.negative"] == Tie("-1 * motor.friction.added.speed_share.positive")
+
+
 def test_a_share_that_a_law_has_already_stays(path: Path) -> None:
     """It is no part of the addition."""
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["drive"]["shafts"][0]["friction"]["added"] = {"omega_s": 0.1}
+    document["drive"]["shafts"][0]["friction"]["added"] = {"speed_share": 0.1}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     bench = open_bench(load_problem(path), Execution(InProcess()))
     found = effects()["asymmetry"].addition(bench.problem.drive, "motor", bench.clues)
     terms = added_terms(found.drive.shaft("motor").friction.law)
     assert terms is not None and terms.stribeck is not None
-    assert terms.omega_s == 0.1
+    assert terms.speed_share == 0.1
     assert terms.stribeck.omega_s == Tie("motor.friction.omega_s")
-    assert "motor.friction.added.omega_s.positive" not in found.off
+    assert "motor.friction.added.speed_share.positive" not in found.off
 
 
 def test_a_law_of_two_directions_is_what_its_mean_and_differences_make(path: Path) -> None:
@@ -98,10 +112,7 @@ def test_a_law_of_two_directions_is_what_its_mean_and_differences_make(path: Pat
         coulomb=Directional(*(sign * odd["tau_c"] for sign in both)),
         viscous=Directional(*(sign * odd["sigma2"] for sign in both)),
         stribeck=StribeckRise(Directional(*(sign * (odd["tau_s"] - odd["tau_c"]) for sign in both)), speeds),
-        **{
-            name: Directional(*(sign * odd[name] / mean[name] for sign in both))
-            for name in ("omega_s", "sigma0", "sigma1")
-        },
+        **{share: Directional(*(sign * odd[name] / mean[name] for sign in both)) for name, share in SHARES.items()},
     )
     plain = LuGre(**{name: Directional(*pair) for name, pair in sides.items()})
     for side in ("positive", "negative"):

@@ -153,8 +153,12 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         "drive.shafts[0].friction.tau_c: guess = 0.05 N m is outside its bounds; 0.06 N m to 1 N m; move",
     ),
     "a share of what the law does not have": (
-        put(FRICTION, {"law": "coulomb", "tau_c": 0.1, "added": {"omega_s": 0.1, "sigma0": 0.1}}),
-        "drive.shafts[0].friction.added.omega_s: a share of a number that this friction does not have; leave it out or",
+        put(FRICTION, {"law": "coulomb", "tau_c": 0.1, "added": {"speed_share": 0.1, "stiffness_share": 0.1}}),
+        "drive.shafts[0].friction.added.speed_share: this friction has no omega_s to be larger by a share; leave it",
+    ),
+    "a share that leaves nothing": (
+        put(FRICTION, LUGRE | {"added": {"speed_share": {"positive": 0.2, "negative": -1.2}}}),
+        "drive.shafts[0].friction.added.speed_share.negative: added.speed_share.negative = -1.2; must be above -1",
     ),
     "tau_s below tau_c": (
         put(f"{FRICTION}/tau_s", 0.03),

@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.expressions import closest, parse, resolve_ties
+from friction_ocp.friction.composite import SHARES
 from friction_ocp.friction.law import AbstractFrictionLaw, Direction
 from friction_ocp.parameters import Free, Tie
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
@@ -23,6 +24,7 @@ _MAY_BE_ZERO = ".second_stage.stiffness"
 _NOT_ZERO = {"ratio", "torque_constant", "gain"}
 _BELOW_ONE = {"rounding"}
 _SHARE = {"lag_hidden", "loss_share"}
+_LARGER_BY = set(SHARES.values())
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
 _DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
@@ -59,6 +61,7 @@ def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
             ((key in _NOT_NEGATIVE or may_be_zero) and number < 0, "must not be negative"),
             (key in _NOT_ZERO and number == 0, "must not be zero"),
             (key in _SHARE and not 0 <= number <= 1, "must be between 0 and 1"),
+            (key in _LARGER_BY and number <= -1, "must be above -1"),
             (key in _BELOW_ONE and not 0 <= number < 1, "must be at least 0 and below 1"),
         ]
         for _, allowed in (item for item in impossible if item[0]):
