@@ -101,6 +101,7 @@ class Diagnosis:
 
     @cached_property
     def _comes_closer(self) -> bool:
+        """Whether free runs of recordings that took no part come closer, or there is nothing to shrink."""
         shown = any(item.excess.significant(self.level) for item in (*self.rounds, *self.superseded))
         shown |= any(effect not in STATED for effect, _ in self.accepted)
         return not (self.accepted and shown) or carries_over(self.before, self.after, self.problem.estimation.seed)

@@ -57,7 +57,12 @@ class FreeErrors:
 
     def excess(self, weight: FloatArray | None = None) -> float:
         """Return E, the mean over channels of max(0, rms^2 / floor^2 - 1)."""
-        return float(np.mean(np.maximum(self.ratios(weight) - 1.0, 0.0)))
+        return excess_of(self.ratios(weight))
+
+
+def excess_of(ratios: FloatArray) -> float:
+    """Return E of (channels,) mean square errors over the squared floor."""
+    return float(np.mean(np.maximum(ratios - 1.0, 0.0)))
 
 
 def free_errors(fitted: FittedModel, held_out: bool) -> FreeErrors:

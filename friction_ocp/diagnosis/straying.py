@@ -8,7 +8,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import input_noise
-from friction_ocp.diagnosis.free_gap import FreeErrors
+from friction_ocp.diagnosis.free_gap import FreeErrors, excess_of
 from friction_ocp.estimation.experiment import Experiment, experiment
 from friction_ocp.estimation.lateness import read_earlier
 from friction_ocp.estimation.model import Model
@@ -30,7 +30,7 @@ def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int) -> bool:
     """
     model, rng, most = fitted.model, np.random.default_rng(seed), errors.excess()
     uses = model.problem.validation or model.problem.train
-    plain = simulate_recordings(model, model.validation or model.train, fitted.theta)
+    plain = errors.runs if model.validation else simulate_recordings(model, model.train, fitted.theta)
     levels = {channel.name: input_noise(model, channel)[0] for _, channel, _ in driving(model.problem.drive, {})}
     levels |= dict(zip(model.drive.output_names, map(float, model.noise), strict=True))
     for _ in range(DRAWS):
@@ -38,7 +38,7 @@ def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int) -> bool:
         runs = simulate_recordings(model, items, fitted.theta)
         apart = np.concatenate([one.simulated - other.simulated for one, other in zip(runs, plain, strict=True)])
         ratios: FloatArray = np.nanmean(apart**2, axis=0) / model.noise**2
-        if float(np.mean(np.maximum(ratios - 1.0, 0.0))) >= most:
+        if excess_of(ratios) >= most:
             return True
     return False
 

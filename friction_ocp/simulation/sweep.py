@@ -23,11 +23,11 @@ __all__ = ["Sweep", "SweepRequest", "SweepResult", "sweep_of"]
 
 TOGETHER = 1024
 """Nodes whose start states are evaluated in one call: CasADi's maps take long to make where they are long."""
+MAPS = 16
+"""Maps of the start states that a sweep keeps."""
 BESIDE = 6e4
 """Effort of a call beside its integrator steps, in steps: what prepares it and what is made of its result. On a
 telescope axis under diagnosis, whose recordings take 18,000 steps, that is most of the time."""
-MAPS = 16
-"""Maps of the start states that a sweep keeps."""
 
 
 class Sweep:

@@ -88,3 +88,17 @@ def diagnosed(path: Path) -> dict[str, Any]:
     """Return the result document of a diagnosis by command, its folder `out` beside the problem."""
     assert main(["diagnose", str(path), "--out", str(path.parent / "out")]) == 0
     return json.loads((path.parent / "out" / "result.json").read_text(encoding="utf-8"))
+
+
+def with_stribeck(path: Path, tau_s: float, omega_s: float) -> Path:
+    """Give the model of a problem Stribeck friction whose guesses are off."""
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["friction"] = {
+        "law": "stribeck",
+        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
+        "tau_s": {"guess": OFF * tau_s, "min": 0, "max": 2},
+        "omega_s": {"guess": OFF * omega_s, "min": 0.1, "max": 40},
+        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
+    }
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, write_case
+from diagnosis_cases import COULOMB, axis, with_stribeck, write_case
 
 from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.diagnose import diagnose
@@ -30,16 +30,7 @@ def path(tmp_path: Path) -> Path:
     """Return the problem of an axis that breaks away harder in one direction, and whose model breaks away evenly."""
     plant = axis(law="stribeck", tau_s=BREAKAWAY, omega_s=SPEED)
     path = write_case(tmp_path, plant, effects=["asymmetry", "constant_torque", "unbalance"])
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["drive"]["shafts"][0]["friction"] = {
-        "law": "stribeck",
-        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
-        "tau_s": {"guess": 0.24 * OFF, "min": 0, "max": 2},
-        "omega_s": {"guess": OFF * SPEED, "min": 0.1, "max": 40},
-        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
-    }
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    return path
+    return with_stribeck(path, 0.24, SPEED)
 
 
 def test_the_rise_near_standstill_differs_where_the_law_has_one(path: Path) -> None:

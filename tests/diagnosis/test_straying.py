@@ -8,8 +8,7 @@ from pathlib import Path
 
 import aries
 import pytest
-import yaml
-from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, diagnosed, write_case
+from diagnosis_cases import axis, diagnosed, with_stribeck, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import free_errors
@@ -34,16 +33,7 @@ def test_what_a_model_lacks_is_more_than_noise_makes_of_free_runs(tmp_path: Path
 
 def test_what_noise_makes_of_free_runs_is_the_bound(tmp_path: Path) -> None:
     """A model of the kind of its plant errs no more than that; errors of a thousand times the power are more."""
-    path = write_case(tmp_path, axis(**RISE))
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["drive"]["shafts"][0]["friction"] = {
-        "law": "stribeck",
-        "tau_c": {"guess": OFF * COULOMB, "min": 0, "max": 2},
-        "tau_s": {"guess": OFF * 0.3, "min": 0, "max": 2},
-        "omega_s": {"guess": OFF * 0.5, "min": 0.1, "max": 40},
-        "viscous": {"guess": OFF * VISCOUS, "min": 0, "max": 0.1},
-    }
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    path = with_stribeck(write_case(tmp_path, axis(**RISE)), 0.3, 0.5)
     fitted = fit_base(prepare(load_problem(path)))
     errors = free_errors(fitted, held_out=True)
     assert strays_as_far(fitted, errors, 0)
