@@ -223,24 +223,26 @@ def complete_candidate(bench: Bench, content: Json, point: Json, asked: float, t
 
     Free runs that were lost before and are not now have come close to the recordings, not to the best end.
     """
-    seat = seat_candidate(bench, restored_screened(bench, content), point)
-    fitted = completed(seat, thorough)
+    item = restored_screened(bench, content)
+    fitted = completed(seat_candidate(bench, item, point), thorough)
     if thorough and bench.current.lost and not fitted.astray:
         fitted = best_nudged(fitted, bench.problem.estimation.seed)
-    return _judged(bench, fitted, asked)
+    return _judged(bench, item, fitted, asked)
 
 
 def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> Json:
     """Do the same from a multiple of the predicted size; null where the simulation breaks down."""
-    fitted = completed(begun_at_size(bench.current, restored_screened(bench, content), scale), thorough=False)
-    return _judged(bench, fitted, asked) if fitted.holds else None
+    item = restored_screened(bench, content)
+    fitted = completed(begun_at_size(bench.current, item, scale), thorough=False)
+    return _judged(bench, item, fitted, asked) if fitted.holds else None
 
 
-def _judged(bench: Bench, fitted: FittedModel, asked: float) -> Json:
+def _judged(bench: Bench, item: Screened, fitted: FittedModel, asked: float) -> Json:
     enough = not bench.current.cost - fitted.cost < asked
     blocks = bench.current.blocks
     costs = blocks_like(bench.current, fitted, blocks) if enough else np.full(blocks.count, np.nan)
-    standing = Standing.of(fitted, enough and bench.standard.is_material(fitted))
+    found = enough and not any(fitted.at_bound(path) for path in item.augmentation.inside)
+    standing = Standing.of(fitted, found and bench.standard.is_material(fitted))
     return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
 
 

@@ -45,6 +45,14 @@ class FittedModel:
         low, high = self.model.space.ends(self.theta)
         return int(np.sum(~low & ~high))
 
+    def at_bound(self, name: str) -> bool:
+        """Whether a parameter lies at one of its bounds; not where its value is stated."""
+        if name not in self.model.space.names:
+            return False
+        low, high = self.model.space.ends(self.theta)
+        at = self.model.space.names.index(name)
+        return bool(low[at] | high[at])
+
     @property
     def objective(self) -> float:
         """The cost of all residuals: half their sum of squares, or what the loss makes of them."""

@@ -30,7 +30,8 @@ class Standing:
     values: Mapping[str, float]
     """Fitted values by name."""
     material: bool = True
-    """Whether it takes away more than the floors are in doubt by; only a refit that is to be added is asked."""
+    """Whether it takes away more than the floors are in doubt by, and is the effect that it is called: its parameters
+    lie where they mean that; only a refit that is to be added is asked."""
     prior: float = 0.0
     """What the distance of fitted values from stated ones costs."""
 

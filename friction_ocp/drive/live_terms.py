@@ -55,7 +55,8 @@ def _transmission(item: Transmission) -> Transmission:
 
 
 def _motor(motor: Motor) -> Motor:
-    plain = is_off(motor.saturation) or motor.saturation_sharpness == SHARPNESS
+    off = is_off(motor.saturation)
+    plain = off or (motor.saturation_tail is None and motor.saturation_sharpness == SHARPNESS)
     return replace(
         motor,
         cogging=_live(motor.cogging),
@@ -65,6 +66,7 @@ def _motor(motor: Motor) -> Motor:
         dead_time=_on(motor.dead_time),
         saturation=_on(motor.saturation),
         saturation_sharpness=None if plain else motor.saturation_sharpness,
+        saturation_tail=None if off else motor.saturation_tail,
     )
 
 

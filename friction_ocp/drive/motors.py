@@ -10,27 +10,41 @@ import casadi as ca
 from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, saturate
 from friction_ocp.drive.mechanism import FEEDBACK_DELAY, Mechanism, Motion, column
 from friction_ocp.drive.parts import Controller, Motor
-from friction_ocp.friction.smoothing import power, sqrt, where
+from friction_ocp.friction.smoothing import exp, log1p_mean, power, sqrt, where
+
+ALL_GONE = -0.999
+"""Of a saturation that falls to nothing: as far as its torque per ampere is followed."""
+NEWTON_STEPS = 3
+"""From the current without saturation, where each squares an error of a fifth at most."""
+LEAST_SLOPE = 0.1
+"""Of voltage over current, in resistances: below it, where iron saturates at once, they are turned back."""
 
 
 def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque that current makes in a motor, 0 while it is not enabled; cogging is apart from it."""
     if mech.driving_signal(motor) == "torque":
         torque = _enabled(mech, motor, _driving(mech, motor, motion))
-        return _saturated(motor, torque, torque / motor.torque_constant) * torque_ripple_factor(mech, motor, motion)
+        left = _left_of_torque(motor, torque / motor.torque_constant)
+        return torque * left * torque_ripple_factor(mech, motor, motion)
     current = motor_current(mech, motor, motion)
     if current is None:
         return 0.0
-    return _saturated(motor, motor.torque_constant * current, current) * torque_ripple_factor(mech, motor, motion)
+    made = motor.torque_constant * current * _left_of_torque(motor, current)
+    return made * torque_ripple_factor(mech, motor, motion)
 
 
-def _saturated(motor: Motor, torque: Any, current: Any) -> Any:
+def _left_of_torque(motor: Motor, current: Any) -> Any:
+    """Return the factor on torque and back-EMF that saturation leaves at a current."""
     if motor.saturation is None:
-        return torque
-    used, sharpness = motor.saturation * current**2, motor.saturation_sharpness
+        return 1.0
+    used, sharpness, tail = motor.saturation * current**2, motor.saturation_sharpness, motor.saturation_tail
     if sharpness is None:
-        return torque / sqrt(1.0 + used)
-    return torque / power(1.0 + power(used, 0.5 * sharpness), 1.0 / sharpness)
+        return 1.0 / sqrt(1.0 + used)
+    fall = power(used, 0.5 * sharpness)
+    if tail is None:
+        return 1.0 / power(1.0 + fall, 1.0 / sharpness)
+    fall = fall / sharpness
+    return exp(-fall * log1p_mean(where(tail * fall > ALL_GONE, tail * fall, ALL_GONE)))
 
 
 def torque_ripple_factor(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -58,15 +72,30 @@ def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
     elif signal == "current":
         current = _driving(mech, motor, motion)
     elif signal == "voltage":
-        current = (_driving(mech, motor, motion) - _back_emf(mech, motor, motion)) / motor.resistance
+        current = _settled_current(motor, _driving(mech, motor, motion), _back_emf(mech, motor, motion))
     else:
         return None
     return _enabled(mech, motor, current)
 
 
 def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
+    """Return the back-EMF that iron without saturation would make."""
     speed = mech.shaft_speed(motor.shaft, motion)
     return motor.torque_constant * torque_ripple_factor(mech, motor, motion) * speed
+
+
+def _settled_current(motor: Motor, voltage: Any, back_emf: Any) -> Any:
+    """Return the current of a winding without inductance, whose back-EMF saturates as its torque does (Newton)."""
+    plain = (voltage - back_emf) / motor.resistance
+    if motor.saturation is None:
+        return plain
+    current = ca.SX.sym("current")
+    error = motor.resistance * current + back_emf * _left_of_torque(motor, current) - voltage
+    nearer = current - error / ca.fmax(ca.gradient(error, current), LEAST_SLOPE * motor.resistance)
+    found = ca.SX(plain)
+    for _ in range(NEWTON_STEPS):
+        found = ca.substitute(nearer, current, found)
+    return found
 
 
 def motor_voltage(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
@@ -158,7 +187,8 @@ def extra_rates(mech: Mechanism, motion: Motion) -> ca.SX:
     for motor in mech.drive.motors:
         if mech.has_winding_state(motor):
             current = motion.extra[mech.extra_names.index(f"{motor.name}.current")]
-            driving = _enabled(mech, motor, _driving(mech, motor, motion) - _back_emf(mech, motor, motion))
+            back_emf = _back_emf(mech, motor, motion) * _left_of_torque(motor, current)
+            driving = _enabled(mech, motor, _driving(mech, motor, motion) - back_emf)
             rates.append((driving - motor.resistance * current) / motor.inductance)
     if "controller.integral" in mech.extra_names:
         controller = mech.drive.controller

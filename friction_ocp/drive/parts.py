@@ -192,7 +192,8 @@ class Motor:
     of the drive is later than that by `dead_time`. A recorded current or voltage lags less than the motor by the share
     `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
     (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the torque over the torque constant
-    where torque drives it.
+    where torque drives it; with a `saturation_tail` q by (1 + q s)^(1/q), s = (saturation i^2)^(p/2) / p, which is the
+    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls alike.
     """
 
     name: str
@@ -206,6 +207,7 @@ class Motor:
     lag: Value = quantity("time", "time constant with which the motor follows its command", 0.0)
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
+    saturation_tail: Value = quantity("dimensionless", "how much torque further current still adds", None)
     dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
     lag_hidden: Value = quantity("dimensionless", "share of the lag that a recorded current does not show", 0.0)
 

@@ -196,6 +196,9 @@ class Augmentation:
     outright: Mapping[str, float] | None = None
     """Values at which a large effect may begin of which small ones tell nothing: no derivative shows a flank out of
     reach. None where they do."""
+    inside: tuple[str, ...] = ()
+    """Paths of added parameters at whose bounds the effect is none, or another one: a fit that ends there has not found
+    it."""
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,7 @@ class PolylineBreakEffect(AbstractEffect):
         bend = Bend(either_way(slope), Free(breaks[2], 0.02 * fastest, fastest))
         trials = tuple(Trial(({f"{path}.slope": slope},), {f"{path}.speed": speed}) for speed in breaks)
         added = with_friction(drive, drive.shaft(place), bend=bend)
-        return Augmentation(added, {f"{path}.slope": 0.0}, trials)
+        return Augmentation(added, {f"{path}.slope": 0.0}, trials, inside=(f"{path}.speed",))
 
 
 class QuadraticDragEffect(AbstractEffect):

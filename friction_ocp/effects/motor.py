@@ -76,10 +76,14 @@ class TorqueSaturationEffect(AbstractEffect):
         return Augmentation(added, {path: 0.0}, (Trial(({path: size},)),))
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        """Return the drive whose torque ceases to rise more suddenly, or less."""
+        """Return the drive whose torque ceases to rise more suddenly, or less, and levels off at another height."""
         motor = motor_of(drive, place)
-        if motor is None or is_off(motor.saturation) or motor.saturation_sharpness != SHARPNESS:
+        if motor is None or is_off(motor.saturation) or motor.saturation_tail is not None:
             return None
-        path = f"{motor.name}.saturation_sharpness"
-        added = change_motor(drive, motor.name, saturation_sharpness=Free(SHARPNESS, 1.0, 20.0))
-        return Augmentation(added, {path: SHARPNESS}, (Trial(({path: 1.1 * SHARPNESS},)),))
+        if motor.saturation_sharpness != SHARPNESS:
+            return None
+        sharpness, tail = (f"{motor.name}.saturation_{name}" for name in ("sharpness", "tail"))
+        free = {"saturation_sharpness": Free(SHARPNESS, 1.0, 20.0), "saturation_tail": Free(SHARPNESS, -1.0, 20.0)}
+        off = {sharpness: SHARPNESS, tail: SHARPNESS}
+        steps = ({sharpness: 1.1 * SHARPNESS}, {tail: 0.9 * SHARPNESS})
+        return Augmentation(change_motor(drive, motor.name, **free), off, (Trial(steps),))

@@ -101,8 +101,8 @@ def sinc(value: Any) -> Any:
 
 
 def log1p_mean(value: Any) -> Any:
-    """log(1 + value) / value for value >= 0, smooth at zero."""
-    large = value > 1e-3
+    """log(1 + value) / value for value > -1, smooth at zero."""
+    large = value * value > 1e-6
     safe = where(large, value, 1.0)
     return where(large, log(1.0 + safe) / safe, 1.0 - value * (1.0 / 2.0 - value * (1.0 / 3.0 - value / 4.0)))
 

@@ -117,6 +117,7 @@ class MotorSection(Section):
     dead_time: Number = 0.0
     saturation: Number = 0.0
     saturation_sharpness: Number = SHARPNESS
+    saturation_tail: Number = None
 
     def build(self, first_shaft: str) -> Motor:
         stated = given(self, *(key for key in self.keys() if key not in ("name", "shaft")))

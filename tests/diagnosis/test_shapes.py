@@ -217,6 +217,17 @@ def test_the_sharpness_of_saturation_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("form", ["tanh", "cubic"])
+def test_a_saturation_of_another_form_is_no_second_effect(tmp_path: Path, form: str) -> None:
+    """What a motor loses more of, or less, than the catalogue's saturation does is no friction."""
+    plain = axis()
+    plant = replace(plain, motors=(replace(plain.motors[0], saturation=PlantSaturation(2.5, form)),))
+    result = diagnosed(tmp_path, plant, ["torque_saturation", "polyline_break", "quadratic_drag", "parameter_error"])
+    assert [item["effect"] for item in result["accepted"]] == ["torque_saturation"]
+    assert not result["remainder"]["significant"]
+
+
+@pytest.mark.slow
 def test_what_does_the_work_of_two_in_a_more_general_shape_takes_their_place(tmp_path: Path) -> None:
     """Unbalance explains a wave once a turn, and cogging one of its overtones: cogging with overtones is all of it."""
     result = diagnosed(tmp_path, cogging_once_a_turn(), ["unbalance", "cogging"])

@@ -10,6 +10,7 @@ from plant import (
     Plant,
     PlantFriction,
     PlantMotor,
+    PlantSaturation,
     PlantSensor,
     PlantShaft,
     PlantTransmission,
@@ -24,6 +25,8 @@ STEP_ERROR = 3e-4
 """Relative error of steps of 1 ms with stops and joints of up to 100 rad/s."""
 WINDING = 1e-2
 """Share of a voltage step that a winding of 2.5 ms gets wrong in its first steps of 1 ms."""
+IRON = 2e-3
+"""The plant takes what saturation leaves from the current of its step before."""
 BOUNCES = 2e-2
 """Steps of 1 ms find the instant of an impact only so well, and every bounce carries that on."""
 ROUNDING = 1e-12
@@ -88,6 +91,18 @@ def test_a_voltage_motor_follows_the_plant(inductance: float, with_enable: bool)
     truth, run = Twin(plant, inputs).run(2.0)
     assert worst(truth, run, "motor.theta", "motor.omega") < STEP_ERROR
     assert worst(truth, run, "current", "torque") < (WINDING if inductance else STEP_ERROR)
+
+
+@pytest.mark.parametrize("inductance", [0.0, 5e-3])
+@pytest.mark.parametrize("iron", [PlantSaturation(2.0, "algebraic", 3.0), PlantSaturation(12.0, "cubic")])
+def test_a_voltage_motor_that_saturates_follows_the_plant(inductance: float, iron: PlantSaturation) -> None:
+    """Torque and back-EMF fall alike: what the winding takes beyond its losses is what the shaft gets."""
+    motor = PlantMotor("drive", "motor", "voltage", 0.1, 2.0, inductance, saturation=iron)
+    plant, inputs = Plant((PlantShaft("motor", 1e-3, FRICTION),), (), (motor,)), {"drive.voltage": reversals(12.0)}
+    truth, run = Twin(plant, inputs).run(2.0)
+    assert worst(truth, run, "motor.theta", "motor.omega") < IRON
+    straight = dataclasses.replace(plant, motors=(dataclasses.replace(motor, saturation=None),))
+    assert worst(truth, Twin(straight, inputs).run(2.0)[1], "motor.omega") > 20 * IRON
 
 
 def test_a_disabled_motor_neither_drives_nor_draws() -> None:

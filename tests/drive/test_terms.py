@@ -218,6 +218,15 @@ def lagged(t: float, x: Sequence[float]) -> list[float]:
     return [x[1], (torque - 0.1 - 0.02 * x[1]) / J, (command(t) - x[2]) / LAG]
 
 
+TAILS: dict[float, Callable[[float], float]] = {
+    -1.0: lambda fall: 1.0 - fall,
+    0.0: lambda fall: np.exp(-fall),
+    1.0: lambda fall: 1.0 / (1.0 + fall),
+    2.0: lambda fall: 1.0 / np.sqrt(1.0 + 2.0 * fall),
+}
+"""What is left of a saturating torque, by tail."""
+
+
 CASES: dict[str, Case] = {
     "rigid kinematic error": Case(geared(), MOVING, rigid()),
     "loaded rigid kinematic error": Case(geared(LOADED_ERROR, RIGID_SHARE), MOVING, rigid(LOADED_ERROR, RIGID_SHARE)),
@@ -242,6 +251,14 @@ CASES: dict[str, Case] = {
         MOVING,
         one_mass(lambda t, q, v: command(t) / np.sqrt(1 + 0.8 * (command(t) / 0.5) ** 2) - 0.1 - 0.02 * v),
     ),
+    **{
+        f"saturation with a tail of {tail}": Case(
+            axis(PLAIN, Motor("servo", "axis", 0.5, saturation=0.1, saturation_tail=tail)),
+            MOVING,
+            one_mass(lambda t, q, v, kept=kept: command(t) * kept(0.05 * (command(t) / 0.5) ** 2) - 0.1 - 0.02 * v),
+        )
+        for tail, kept in TAILS.items()
+    },
     "cogging": Case(
         axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
         MOVING,

@@ -53,6 +53,7 @@ PLANTS: dict[str, Plant] = {
     "lag": pair(motor=replace(MOTOR, amplifier=PlantAmplifier(time_constant=0.02))),
     "saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 2.0))),
     "sharp saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(1.0, "algebraic", 4.0))),
+    "cubic saturation": pair(motor=replace(MOTOR, saturation=PlantSaturation(3.0, "cubic"))),
     "stiffening": pair(joint=replace(JOINT, cubic=3e5)),
     "second stage": pair(joint=replace(JOINT, second_stage=(900.0, 0.003))),
     "hysteresis": pair(joint=replace(JOINT, loop=PlantLoop(((1.0, 0.003),), smooth=True))),

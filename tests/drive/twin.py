@@ -144,7 +144,8 @@ def _transmission(item: PlantTransmission) -> Transmission:
 def _motor(motor: PlantMotor, sensors: Sequence[PlantSensor]) -> Motor:
     """Return the motor of the plant, its recorded current being its command where a sensor measures that."""
     voltage, saturation = motor.drive == "voltage", motor.saturation
-    assert saturation is None or saturation.form == "algebraic"
+    assert saturation is None or saturation.form in ("algebraic", "cubic")
+    cubic = saturation is not None and saturation.form == "cubic"
     return Motor(
         motor.name,
         motor.shaft,
@@ -155,8 +156,9 @@ def _motor(motor: PlantMotor, sensors: Sequence[PlantSensor]) -> Motor:
         _wave(Cogging, motor.cogging),
         _wave(TorqueRipple, motor.torque_ripple),
         0.0 if motor.amplifier is None else motor.amplifier.time_constant,
-        0.0 if saturation is None else saturation.current**-2.0,
-        2.0 if saturation is None else saturation.sharpness,
+        0.0 if saturation is None else saturation.current**-2.0 * (2.0 / 3.0 if cubic else 1.0),
+        2.0 if saturation is None or cubic else saturation.sharpness,
+        -1.0 if cubic else None,
         lag_hidden=float(any(item.measures == f"{motor.name}.command" for item in sensors)),
     )
 

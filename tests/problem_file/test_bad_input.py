@@ -232,6 +232,10 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
         put("drive/motor/saturation", -1),
         "drive.motor.saturation: saturation = -1 1/A^2; must not be negative",
     ),
+    "a saturation that turns the torque round": (
+        put("drive/motor/saturation_tail", -1.5),
+        "drive.motor.saturation_tail: saturation_tail = -1.5; must be at least -1",
+    ),
     "negative lag": (put("drive/motor/lag", -1), "drive.motor.lag: lag = -1 s; must not be negative"),
     "break count": (
         put(FRICTION, {"law": "polyline", "tau_c": 0.1, "slopes": [1, 2], "breaks": [1, 2]}),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,10 +21,14 @@ _POSITIVE = {
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
 _MAY_BE_ZERO = ".second_stage.stiffness"
 """A stiffness that adds to another."""
-_NOT_ZERO = {"ratio", "torque_constant", "gain"}
-_BELOW_ONE = {"rounding"}
-_SHARE = {"lag_hidden", "loss_share"}
-_LARGER_BY = set(SHARES.values())
+_RANGES: tuple[tuple[Collection[str], Callable[[float], bool], str], ...] = (
+    ({"ratio", "torque_constant", "gain"}, lambda number: number != 0, "must not be zero"),
+    ({"lag_hidden", "loss_share"}, lambda number: 0 <= number <= 1, "must be between 0 and 1"),
+    (set(SHARES.values()), lambda number: number > -1, "must be above -1"),
+    ({"saturation_tail"}, lambda number: number >= -1, "must be at least -1"),
+    ({"rounding"}, lambda number: 0 <= number < 1, "must be at least 0 and below 1"),
+)
+"""Names of numbers, which of these are possible, and what to say of others."""
 _SOLVER_TOLERANCE = 1e-6
 """Relative; a fit with tau_s >= tau_c may end that far on the other side, and its answer is a problem again."""
 _DIRECTIONS: tuple[Direction, ...] = ("positive", "negative")
@@ -59,10 +63,7 @@ def numbers_have_possible_signs(case: Case) -> Iterator[Finding]:
         impossible = [
             (key in _POSITIVE and not may_be_zero and number <= 0, "must be positive"),
             ((key in _NOT_NEGATIVE or may_be_zero) and number < 0, "must not be negative"),
-            (key in _NOT_ZERO and number == 0, "must not be zero"),
-            (key in _SHARE and not 0 <= number <= 1, "must be between 0 and 1"),
-            (key in _LARGER_BY and number <= -1, "must be above -1"),
-            (key in _BELOW_ONE and not 0 <= number < 1, "must be at least 0 and below 1"),
+            *((key in names and not possible(number), allowed) for names, possible, allowed in _RANGES),
         ]
         for _, allowed in (item for item in impossible if item[0]):
             yield Finding(case.at(case.place(path)), case.written(path), allowed)
