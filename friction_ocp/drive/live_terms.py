@@ -67,6 +67,7 @@ def _motor(motor: Motor) -> Motor:
         saturation=_on(motor.saturation),
         saturation_sharpness=None if plain else motor.saturation_sharpness,
         saturation_tail=None if off else motor.saturation_tail,
+        saturation_in_emf=None if off or motor.saturation_in_emf == 1.0 else motor.saturation_in_emf,
     )
 
 

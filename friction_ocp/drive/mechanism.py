@@ -278,12 +278,7 @@ class Mechanism:
 
     def driving_signal(self, motor: Motor) -> str | None:
         """Return what drives a motor: torque, current or voltage; None where nothing does."""
-        given = {channel.measures for channel in self.drive.inputs}
-        controller = self.drive.controller
-        for signal in ("torque", "current", "voltage"):
-            if f"{motor.name}.{signal}" in given or (controller is not None and controller.output == signal):
-                return signal
-        return "current" if f"{motor.name}.current_command" in given else None
+        return self.drive.driving_signal(motor)
 
 
 FEEDBACK_DELAY = "controller.feedback_delay"

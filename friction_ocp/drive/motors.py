@@ -14,8 +14,8 @@ from friction_ocp.friction.smoothing import exp, log1p_mean, power, sqrt, where
 
 ALL_GONE = -0.999
 """Of a saturation that falls to nothing: as far as its torque per ampere is followed."""
-NEWTON_STEPS = 3
-"""From the current without saturation, where each squares an error of a fifth at most."""
+NEWTON_STEPS = 4
+"""From the current without saturation; each squares the error, and a millionth is left where it began at a half."""
 LEAST_SLOPE = 0.1
 """Of voltage over current, in resistances: below it, where iron saturates at once, they are turned back."""
 
@@ -34,7 +34,7 @@ def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
 
 
 def _left_of_torque(motor: Motor, current: Any) -> Any:
-    """Return the factor on torque and back-EMF that saturation leaves at a current."""
+    """Return the factor on the torque that saturation leaves at a current."""
     if motor.saturation is None:
         return 1.0
     used, sharpness, tail = motor.saturation * current**2, motor.saturation_sharpness, motor.saturation_tail
@@ -45,6 +45,12 @@ def _left_of_torque(motor: Motor, current: Any) -> Any:
         return 1.0 / power(1.0 + fall, 1.0 / sharpness)
     fall = fall / sharpness
     return exp(-fall * log1p_mean(where(tail * fall > ALL_GONE, tail * fall, ALL_GONE)))
+
+
+def _left_of_emf(motor: Motor, current: Any) -> Any:
+    """Return the factor on the back-EMF that saturation leaves at a current."""
+    left, share = _left_of_torque(motor, current), motor.saturation_in_emf
+    return left if share is None else 1.0 - share * (1.0 - left)
 
 
 def torque_ripple_factor(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -85,12 +91,12 @@ def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
 
 
 def _settled_current(motor: Motor, voltage: Any, back_emf: Any) -> Any:
-    """Return the current of a winding without inductance, whose back-EMF saturates as its torque does (Newton)."""
+    """Return the current of a winding without inductance, whose back-EMF saturates with its torque (Newton)."""
     plain = (voltage - back_emf) / motor.resistance
     if motor.saturation is None:
         return plain
     current = ca.SX.sym("current")
-    error = motor.resistance * current + back_emf * _left_of_torque(motor, current) - voltage
+    error = motor.resistance * current + back_emf * _left_of_emf(motor, current) - voltage
     nearer = current - error / ca.fmax(ca.gradient(error, current), LEAST_SLOPE * motor.resistance)
     found = ca.SX(plain)
     for _ in range(NEWTON_STEPS):
@@ -187,7 +193,7 @@ def extra_rates(mech: Mechanism, motion: Motion) -> ca.SX:
     for motor in mech.drive.motors:
         if mech.has_winding_state(motor):
             current = motion.extra[mech.extra_names.index(f"{motor.name}.current")]
-            back_emf = _back_emf(mech, motor, motion) * _left_of_torque(motor, current)
+            back_emf = _back_emf(mech, motor, motion) * _left_of_emf(motor, current)
             driving = _enabled(mech, motor, _driving(mech, motor, motion) - back_emf)
             rates.append((driving - motor.resistance * current) / motor.inductance)
     if "controller.integral" in mech.extra_names:

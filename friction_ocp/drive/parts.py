@@ -193,7 +193,8 @@ class Motor:
     `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
     (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the torque over the torque constant
     where torque drives it; with a `saturation_tail` q by (1 + q s)^(1/q), s = (saturation i^2)^(p/2) / p, which is the
-    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls alike.
+    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls
+    alike where it is flux that is missing, and keeps what losses take: `saturation_in_emf` is the share that it lacks.
     """
 
     name: str
@@ -208,6 +209,7 @@ class Motor:
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
     saturation_tail: Value = quantity("dimensionless", "how much torque further current still adds", None)
+    saturation_in_emf: Value = quantity("dimensionless", "share of the missing torque that the back-EMF lacks too", 1.0)
     dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
     lag_hidden: Value = quantity("dimensionless", "share of the lag that a recorded current does not show", 0.0)
 
@@ -302,6 +304,14 @@ class Drive:
     def clock_of(self, channel: Channel) -> Clock | None:
         """Return the clock of its own that stamps a channel; None where that is the clock of the recording."""
         return next((clock for clock in self.clocks if clock.name == channel.clock), None)
+
+    def driving_signal(self, motor: Motor) -> str | None:
+        """Return what drives a motor: torque, current or voltage; None where nothing does."""
+        given, controller = {channel.measures for channel in self.inputs}, self.controller
+        for signal in ("torque", "current", "voltage"):
+            if f"{motor.name}.{signal}" in given or (controller is not None and controller.output == signal):
+                return signal
+        return "current" if f"{motor.name}.current_command" in given else None
 
     @property
     def prescribing(self) -> tuple[Channel, ...]:

@@ -82,8 +82,9 @@ class TorqueSaturationEffect(AbstractEffect):
             return None
         if motor.saturation_sharpness != SHARPNESS:
             return None
-        sharpness, tail = (f"{motor.name}.saturation_{name}" for name in ("sharpness", "tail"))
         free = {"saturation_sharpness": Free(SHARPNESS, 1.0, 20.0), "saturation_tail": Free(SHARPNESS, -1.0, 20.0)}
-        off = {sharpness: SHARPNESS, tail: SHARPNESS}
-        steps = ({sharpness: 1.1 * SHARPNESS}, {tail: 0.9 * SHARPNESS})
+        if drive.driving_signal(motor) == "voltage" and motor.saturation_in_emf == 1.0:
+            free["saturation_in_emf"] = Free(1.0, 0.0, 1.0)
+        off = {f"{motor.name}.{name}": part.guess for name, part in free.items()}
+        steps = tuple({path: 0.9 * value} for path, value in off.items())
         return Augmentation(change_motor(drive, motor.name, **free), off, (Trial(steps),))

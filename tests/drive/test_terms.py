@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from plant import Trajectory
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from twin import Bench
 
 from friction_ocp.drive.dae_form import dae
@@ -218,6 +219,28 @@ def lagged(t: float, x: Sequence[float]) -> list[float]:
     return [x[1], (torque - 0.1 - 0.02 * x[1]) / J, (command(t) - x[2]) / LAG]
 
 
+KT, OHMS, IRON = 0.4, 0.5, 0.3
+
+
+def saturating(share: float) -> Case:
+    """Return a motor under a voltage whose back-EMF lacks a share of the torque that its iron does."""
+    motor = Motor("servo", "axis", KT, OHMS, saturation=IRON, saturation_in_emf=share)
+    driven = Channel("torque", "servo.voltage", "input")
+    drive = replace(axis(PLAIN, motor), channels=(driven, *axis(PLAIN, motor).channels[1:]))
+
+    def rates(t: float, x: Sequence[float]) -> list[float]:
+        def left(current: float) -> float:
+            return 1.0 / np.sqrt(1.0 + IRON * current**2)
+
+        def missing(current: float) -> float:
+            return OHMS * current + KT * x[1] * (1.0 - share * (1.0 - left(current))) - command(t)
+
+        current = float(brentq(missing, -50.0, 50.0, xtol=1e-13))
+        return [x[1], (KT * current * left(current) - 0.1 - 0.02 * x[1]) / J]
+
+    return Case(drive, MOVING, rates)
+
+
 TAILS: dict[float, Callable[[float], float]] = {
     -1.0: lambda fall: 1.0 - fall,
     0.0: lambda fall: np.exp(-fall),
@@ -259,6 +282,7 @@ CASES: dict[str, Case] = {
         )
         for tail, kept in TAILS.items()
     },
+    **{f"back-EMF that saturates by {share:g}": saturating(share) for share in (0.0, 0.5, 1.0)},
     "cogging": Case(
         axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
         MOVING,

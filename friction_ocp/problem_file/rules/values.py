@@ -23,7 +23,7 @@ _MAY_BE_ZERO = ".second_stage.stiffness"
 """A stiffness that adds to another."""
 _RANGES: tuple[tuple[Collection[str], Callable[[float], bool], str], ...] = (
     ({"ratio", "torque_constant", "gain"}, lambda number: number != 0, "must not be zero"),
-    ({"lag_hidden", "loss_share"}, lambda number: 0 <= number <= 1, "must be between 0 and 1"),
+    ({"lag_hidden", "loss_share", "saturation_in_emf"}, lambda number: 0 <= number <= 1, "must be between 0 and 1"),
     (set(SHARES.values()), lambda number: number > -1, "must be above -1"),
     ({"saturation_tail"}, lambda number: number >= -1, "must be at least -1"),
     ({"rounding"}, lambda number: 0 <= number < 1, "must be at least 0 and below 1"),
