@@ -55,12 +55,13 @@ def _transmission(item: Transmission) -> Transmission:
 
 
 def _motor(motor: Motor) -> Motor:
-    off = is_off(motor.saturation)
+    off, ripple = is_off(motor.saturation), _live(motor.torque_ripple)
     plain = off or (motor.saturation_tail is None and motor.saturation_sharpness == SHARPNESS)
     return replace(
         motor,
         cogging=_live(motor.cogging),
-        torque_ripple=_live(motor.torque_ripple),
+        torque_ripple=ripple,
+        ripple_in_emf=None if ripple is None or motor.ripple_in_emf == 1.0 else motor.ripple_in_emf,
         lag=_on(motor.lag),
         lag_hidden=None if is_off(motor.lag) else _on(motor.lag_hidden),
         dead_time=_on(motor.dead_time),
