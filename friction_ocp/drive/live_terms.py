@@ -55,13 +55,12 @@ def _transmission(item: Transmission) -> Transmission:
 
 
 def _motor(motor: Motor) -> Motor:
-    off, ripple = is_off(motor.saturation), _live(motor.torque_ripple)
+    off = is_off(motor.saturation)
     plain = off or (motor.saturation_tail is None and motor.saturation_sharpness == SHARPNESS)
     return replace(
         motor,
         cogging=_live(motor.cogging),
-        torque_ripple=ripple,
-        ripple_in_emf=None if ripple is None or motor.ripple_in_emf == 1.0 else motor.ripple_in_emf,
+        torque_ripple=_live(motor.torque_ripple),
         lag=_on(motor.lag),
         lag_hidden=None if is_off(motor.lag) else _on(motor.lag_hidden),
         dead_time=_on(motor.dead_time),

@@ -54,7 +54,7 @@ def _left_of_emf(motor: Motor, current: Any) -> Any:
 
 
 def torque_ripple_factor(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
-    """Return the factor on the torque at the angle of the motor."""
+    """Return the factor on torque and back-EMF at the angle of the motor."""
     if motor.torque_ripple is None:
         return 1.0
     return 1.0 + motor.torque_ripple.value(*mech.angle_passed(motor.shaft, motion))
@@ -86,10 +86,8 @@ def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
 
 def _back_emf(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the back-EMF that iron without saturation would make."""
-    speed, factor = mech.shaft_speed(motor.shaft, motion), torque_ripple_factor(mech, motor, motion)
-    if motor.ripple_in_emf is not None:
-        factor = 1.0 + motor.ripple_in_emf * (factor - 1.0)
-    return motor.torque_constant * factor * speed
+    speed = mech.shaft_speed(motor.shaft, motion)
+    return motor.torque_constant * torque_ripple_factor(mech, motor, motion) * speed
 
 
 def _settled_current(motor: Motor, voltage: Any, back_emf: Any) -> Any:

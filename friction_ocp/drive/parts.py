@@ -188,7 +188,6 @@ SHARPNESS = 2.0
 class Motor:
     """An electric motor on a shaft; its back-EMF constant equals its torque constant.
 
-    A torque ripple is one of the flux, and the back-EMF has the share `ripple_in_emf` of it, all of it unless stated.
     What drives it (current, torque or voltage) follows its command with the time constant `lag`, and all that is seen
     of the drive is later than that by `dead_time`. A recorded current or voltage lags less than the motor by the share
     `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
@@ -210,7 +209,6 @@ class Motor:
     saturation: Value = quantity("saturation", "1 / I^2 of the current I that makes all torque that there is", 0.0)
     saturation_sharpness: Value = quantity("dimensionless", "how suddenly the torque ceases to rise", SHARPNESS)
     saturation_tail: Value = quantity("dimensionless", "how much torque further current still adds", None)
-    ripple_in_emf: Value = quantity("dimensionless", "share of the torque ripple that the back-EMF has too", 1.0)
     saturation_in_emf: Value = quantity("dimensionless", "share of the missing torque that the back-EMF lacks too", 1.0)
     dead_time: Value = quantity("time", "time after which the motor begins to follow its command", 0.0)
     lag_hidden: Value = quantity("dimensionless", "share of the lag that a recorded current does not show", 0.0)

@@ -176,16 +176,6 @@ class TorqueRippleEffect(AbstractMotorWaveEffect):
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE, clues.periods(place, "theta", against_torque=_motor_at(drive, place).name)
 
-    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        """Return the drive with a further wave, or overtones; under a voltage the back-EMF may have a share of it."""
-        found, motor = super().reshaped(drive, place, clues), _motor_at(drive, place)
-        if found is None or drive.driving_signal(motor) != "voltage" or motor.ripple_in_emf != 1.0:
-            return found
-        path = f"{motor.name}.ripple_in_emf"
-        added = change_motor(found.drive, motor.name, ripple_in_emf=Free(1.0, 0.0, 1.0))
-        trials = tuple(replace(trial, amplitudes=(*trial.amplitudes, {path: 0.9})) for trial in found.trials)
-        return Augmentation(added, {**found.off, path: 1.0}, trials)
-
 
 class PeriodicDisturbanceEffect(AbstractWaveEffect):
     """External torque periodic in time."""

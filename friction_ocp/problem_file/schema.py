@@ -119,7 +119,6 @@ class MotorSection(Section):
     saturation_sharpness: Number = SHARPNESS
     saturation_tail: Number = None
     saturation_in_emf: Number = 1.0
-    ripple_in_emf: Number = 1.0
 
     def build(self, first_shaft: str) -> Motor:
         stated = given(self, *(key for key in self.keys() if key not in ("name", "shaft")))

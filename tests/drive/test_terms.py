@@ -241,20 +241,6 @@ def saturating(share: float) -> Case:
     return Case(drive, MOVING, rates)
 
 
-def rippling(share: float) -> Case:
-    """Return a motor under a voltage whose back-EMF has a share of its torque ripple."""
-    motor = Motor("servo", "axis", KT, OHMS, torque_ripple=TorqueRipple(*AMPLITUDES, PERIOD), ripple_in_emf=share)
-    driven = Channel("torque", "servo.voltage", "input")
-    drive = replace(axis(PLAIN, motor), channels=(driven, *axis(PLAIN, motor).channels[1:]))
-
-    def rates(t: float, x: Sequence[float]) -> list[float]:
-        ripple = wave(AMPLITUDES, PERIOD, x[0])
-        current = (command(t) - KT * x[1] * (1.0 + share * ripple)) / OHMS
-        return [x[1], (KT * current * (1.0 + ripple) - 0.1 - 0.02 * x[1]) / J]
-
-    return Case(drive, MOVING, rates)
-
-
 TAILS: dict[float, Callable[[float], float]] = {
     -1.0: lambda fall: 1.0 - fall,
     0.0: lambda fall: np.exp(-fall),
@@ -297,7 +283,6 @@ CASES: dict[str, Case] = {
         for tail, kept in TAILS.items()
     },
     **{f"back-EMF that saturates by {share:g}": saturating(share) for share in (0.0, 0.5, 1.0)},
-    **{f"back-EMF that ripples by {share:g}": rippling(share) for share in (0.0, 0.5, 1.0)},
     "cogging": Case(
         axis(PLAIN, Motor("servo", "axis", cogging=Cogging(0.05, 0.08, PERIOD))),
         MOVING,

@@ -21,10 +21,9 @@ _POSITIVE = {
 _NOT_NEGATIVE = {"tau_c", "tau_s", "sigma1", "damping", "backlash", "lag", "dead_time"}
 _MAY_BE_ZERO = ".second_stage.stiffness"
 """A stiffness that adds to another."""
-_SHARES_OF_ALL = {"lag_hidden", "loss_share", "saturation_in_emf", "ripple_in_emf"}
 _RANGES: tuple[tuple[Collection[str], Callable[[float], bool], str], ...] = (
     ({"ratio", "torque_constant", "gain"}, lambda number: number != 0, "must not be zero"),
-    (_SHARES_OF_ALL, lambda number: 0 <= number <= 1, "must be between 0 and 1"),
+    ({"lag_hidden", "loss_share", "saturation_in_emf"}, lambda number: 0 <= number <= 1, "must be between 0 and 1"),
     (set(SHARES.values()), lambda number: number > -1, "must be above -1"),
     ({"saturation_tail"}, lambda number: number >= -1, "must be at least -1"),
     ({"rounding"}, lambda number: 0 <= number < 1, "must be at least 0 and below 1"),
