@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Tell, open_bench, open_predicting
+from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import DOUBTED, Excess
@@ -18,6 +18,7 @@ from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
+from friction_ocp.diagnosis.predicted import LEAST_SHARE, led_by_predictions
 from friction_ocp.diagnosis.reading import explains_more
 from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
@@ -30,8 +31,6 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.statistics.execution import Execution
 
-LEAST_SHARE = 0.25
-"""Of the effort, for the inputs read another way where the search before took more than the rest."""
 MOST_PARTS = 4
 """Parts whose stated values may be taken back."""
 
@@ -211,7 +210,7 @@ def _diagnosed(
         search = Search(open_bench(problem, run), run, meant, level, tell, patience, readings)
         search.go()
         if search.lost_its_way:
-            search = _by_predictions(search, run)
+            search = led_by_predictions(search, run)
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
     current, checked = _checked(search.bench.current, base, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
@@ -237,14 +236,6 @@ def _diagnosed(
             cut_short=search.cut_short,
         )
     )
-
-
-def _by_predictions(search: Search, run: Execution) -> Search:
-    """Look for additions by short predictions where nothing leads on; return the search that found some."""
-    patience = search.patience * max(1.0 - search.effort, LEAST_SHARE)
-    other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
-    other.go()
-    return other if other.accepted else search
 
 
 def _in_hindsight(found: Diagnosis) -> Diagnosis:

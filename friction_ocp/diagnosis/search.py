@@ -91,9 +91,9 @@ class Search:
 
     @property
     def lost_its_way(self) -> bool:
-        """Whether nothing was added to a model so far off that segments joined by noise lead nowhere."""
+        """Whether nothing was added to a model so far off that its simulations lead nowhere."""
         base = self.bench.base
-        return not self.accepted and base.astray and base.footing.joined
+        return not self.accepted and base.astray and not base.footing.predicted
 
     def _exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""

@@ -1,0 +1,72 @@
+"""Additions that short predictions find where simulations have gone astray, and where free runs go on from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.diagnosis.bench import Bench, blocks_like, open_predicting
+from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.held_out import held_out
+from friction_ocp.diagnosis.polishing import polished
+from friction_ocp.diagnosis.refit import completed
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.search import Search
+from friction_ocp.diagnosis.select import Choice, Round
+from friction_ocp.estimation.model import with_drive
+from friction_ocp.statistics.execution import Execution
+
+LEAST_SHARE = 0.25
+"""Of the effort, for another search where the one before took more than the rest."""
+
+
+def led_by_predictions(search: Search, run: Execution) -> Search:
+    """Look for additions by short predictions where a search found nothing; return the search that found some.
+
+    Free runs that come back to the recordings with these additions show what predictions cannot, and the search goes on
+    with them.
+    """
+    patience = search.patience * max(1.0 - search.effort, LEAST_SHARE)
+    other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
+    other.go()
+    if not other.accepted:
+        return search
+    again = _on_free_runs(search, other, run) if search.bench.base.lost else None
+    return other if again is None else again
+
+
+def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | None:
+    """Go on with free runs from what predictions have found; None where these stay astray."""
+    bench, rounds = search.bench.at(search.bench.base), list[Round]()
+    for item in other.rounds:
+        if item.accepted is None or item.accepted.key not in other.accepted:
+            continue
+        done = _in_free_runs(bench, item)
+        if done is None or done.accepted is None:
+            return None
+        bench, rounds = bench.at(done.accepted.fitted), [*rounds, done]
+    accepted = [item.accepted.key for item in rounds if item.accepted is not None]
+    patience = search.patience * max(1.0 - search.effort - other.effort, LEAST_SHARE)
+    again = Search(bench, run, search.meant, search.level, search.tell, patience, rounds=rounds, accepted=accepted)
+    again.go()
+    return again if again.accepted and not again.bench.current.astray else None
+
+
+def _in_free_runs(bench: Bench, item: Round) -> Round | None:
+    """Return a round as free runs see it, from where predictions have left it; None where they come no closer."""
+    current, rival = bench.current, item.accepted
+    assert rival is not None
+    model = with_drive(current.model, rival.screened.augmentation.drive)
+    start = model.space.with_known({**current.values, **rival.standing.values})
+    fitted = completed(polished(model, current.footing, start, None))
+    if not fitted.holds or fitted.cost >= current.cost:
+        return None
+    blocks = current.blocks
+    gains = blocks.sums(held_out(current)) - blocks_like(current, fitted, blocks)
+    own = Rival.of(rival.screened, fitted, np.asarray(gains))
+    chance = dict(zip((one.key for one in item.choice.rivals), item.choice.probabilities, strict=True))[rival.key]
+    choice = Choice((own,), (chance,), 1.0 - chance, True, (own,), (own,))
+    return replace(
+        item, screened=(), choice=choice, before=current, excess=excess(current.linear.rows, blocks), accepted=own
+    )
