@@ -113,7 +113,7 @@ class Search:
                 self.bench = back
                 done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
-                done = self._elsewhere() or done
+                done = self._in_its_shape(done) or self._elsewhere() or done
             self.rounds.append(done)
             if done.accepted is None:
                 break
@@ -139,6 +139,25 @@ class Search:
         """Look for a better fit of the base model; whether there is one."""
         known, self.bench = self.bench, opened_better(self.bench, self.run)
         return self.bench is not known
+
+    def _in_its_shape(self, done: Round) -> Round | None:
+        """Take what explains most, and yet not for certain, for what it is in its more general shape, if that is.
+
+        What the catalogue's shape of an effect leaves may be so much that whether it helps is chance.
+        """
+        current = self.bench.current
+        noise = 0.5 * samples(current)
+        for rival in done.choice.rivals[:1]:
+            most = current.cost - rival.standing.cost >= MOST_OF * (current.cost - noise)
+            if not most or not self._grows(rival) or self._exhausted():
+                continue
+            bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
+            grown = self._round(bench, keys, NONE)
+            if grown.accepted is not None and beats(grown.accepted.fitted, current, self.level, self.rng):
+                self.rounds.append(replace(done, accepted=rival))
+                self.bench, self.accepted = bench, keys
+                return grown
+        return None
 
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""
