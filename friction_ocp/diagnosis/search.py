@@ -124,7 +124,8 @@ class Search:
                     break
             if self._exhausted():
                 break
-        if len(set(self.accepted)) > 1 and innovations(self.bench.current).significant(self.level):
+        unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
+        if unknown and len(set(self.accepted)) > 1:
             current, self.accepted = without_small(self.bench, self.accepted)
             self.bench = self.bench.at(current)
         if self.accepted and not self._helps(self.bench):
