@@ -76,10 +76,10 @@ def without_superfluous(
 def without_small(bench: Bench, accepted: list[Key]) -> tuple[FittedModel, list[Key]]:
     """Drop additions, the latest first, without which little more of the whole gap is left; one stays.
 
-    For where more than noise is left at the end, though all was tried. A small addition is one for what it does to the rest: two effects of
-    which one is small leave next to nothing, and what takes almost all that is left without it stays. Beside something
-    unknown the rest is what stand-ins for it leave, whose shape is not quite that of the machine, and what explains a
-    part of that is no further effect.
+    For where more than noise is left at the end, though all was tried. A small addition is one for what it does to
+    the rest: two effects of which one is small leave next to nothing, and what takes almost all that is left
+    without it stays. Beside something unknown the rest is what stand-ins for it leave, whose shape is not quite
+    that of the machine, and what explains a part of that is no further effect.
     """
     current = bench.current
     least = OF_ALL * (bench.base.cost - 0.5 * samples(bench.base))
