@@ -27,6 +27,9 @@ class Blocks:
     """(rows,); -1 for rows that belong to no time, such as priors."""
     recording: IntArray
     """(blocks,) the recording of each block."""
+    independent: float = 1.0
+    """Independent samples that a block has on average: one for each integrated autocorrelation time that it is meant to
+    be long, fewer where recordings are too short for such blocks, and one at least."""
 
     @property
     def count(self) -> int:
@@ -46,6 +49,7 @@ def blocks_of(rows: Rows) -> Blocks:
     recordings = [int(k) for k in np.unique(rows.recording) if k >= 0]
     of_row = np.full(rows.residual.size, -1, dtype=np.int64)
     owner: list[int] = []
+    independent = 0.0
     for k in recordings:
         own = np.flatnonzero(rows.recording == k)
         time = rows.time[own]
@@ -53,12 +57,13 @@ def blocks_of(rows: Rows) -> Blocks:
         length = CORRELATION_LENGTHS * max(
             _correlation_time(rows, k, c) for c in np.unique(rows.channel[own]) if c >= 0
         )
-        fewest = int(np.ceil(FEWEST / len(recordings)))
-        count = int(np.clip((end - begin) / max(length, 1e-300), fewest, max(MOST // len(recordings), fewest)))
+        fewest, lengths = int(np.ceil(FEWEST / len(recordings))), (end - begin) / max(length, 1e-300)
+        count = int(np.clip(lengths, fewest, max(MOST // len(recordings), fewest)))
+        independent += float(np.clip(CORRELATION_LENGTHS * lengths, count, CORRELATION_LENGTHS * count))
         place = np.minimum(((time - begin) / max(end - begin, 1e-300) * count).astype(np.int64), count - 1)
         of_row[own] = len(owner) + place
         owner += [k] * count
-    return Blocks(of_row, np.array(owner, dtype=np.int64))
+    return Blocks(of_row, np.array(owner, dtype=np.int64), independent / max(len(owner), 1))
 
 
 def _correlation_time(rows: Rows, recording: int, channel: int) -> float:

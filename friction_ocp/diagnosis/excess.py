@@ -37,7 +37,7 @@ def excess(rows: Rows, blocks: Blocks) -> Excess:
     """Test whether the mean power of the blocks exceeds what noise gives (one-sided t test over blocks).
 
     A gap in a few blocks alone makes their powers so unequal that a t test sees nothing: the mean is also compared with
-    what it would be if every block held one independent sample (chi-square). Static points are independent of one
+    what the independent samples of the blocks make of noise (chi-square). Static points are independent of one
     another: each set is tested by itself. The smallest p-value counts, times the number of tests (Bonferroni).
     """
     samples = (rows.channel >= 0) & (rows.residual != 0.0)
@@ -49,7 +49,8 @@ def excess(rows: Rows, blocks: Blocks) -> Excess:
         return Excess(mean, 1.0)
     spread = float(np.std(ratios, ddof=1)) / np.sqrt(ratios.size)
     statistic = (float(np.mean(ratios)) - DOUBTED) / max(spread, 1e-300)
-    rare = float(stats.chi2.sf(float(np.sum(ratios)) / DOUBTED, ratios.size))
+    each = blocks.independent
+    rare = float(stats.chi2.sf(each * float(np.sum(ratios)) / DOUBTED, each * ratios.size))
     tests = [float(stats.t.sf(statistic, ratios.size - 1)), rare]
     for number in rows.static:
         errors = rows.residual[rows.recording == number]
