@@ -148,17 +148,18 @@ class Search:
         """
         current = self.bench.current
         noise = 0.5 * samples(current)
-        for rival in done.choice.rivals[:1]:
-            most = current.cost - rival.standing.cost >= MOST_OF * (current.cost - noise)
-            if not most or not self._grows(rival) or self._exhausted():
-                continue
-            bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
-            grown = self._round(bench, keys, NONE)
-            if grown.accepted is not None and beats(grown.accepted.fitted, current, self.level, self.rng):
-                self.rounds.append(replace(done, accepted=rival))
-                self.bench, self.accepted = bench, keys
-                return grown
-        return None
+        rival = next(iter(done.choice.rivals), None)
+        if rival is None or current.cost - rival.standing.cost < MOST_OF * (current.cost - noise):
+            return None
+        if not self._grows(rival) or self._exhausted():
+            return None
+        bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
+        grown = self._round(bench, keys, NONE)
+        if grown.accepted is None or not beats(grown.accepted.fitted, current, self.level, self.rng):
+            return None
+        self.rounds.append(replace(done, accepted=rival))
+        self.bench, self.accepted = bench, keys
+        return grown
 
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""

@@ -193,8 +193,8 @@ class Motor:
     `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
     (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the torque over the torque constant
     where torque drives it; with a `saturation_tail` q by (1 + q s)^(1/q), s = (saturation i^2)^(p/2) / p, which is the
-    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls
-    alike where it is flux that is missing, and keeps what losses take: `saturation_in_emf` is the share that it lacks.
+    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls alike where
+    flux is missing, and keeps what losses take: `saturation_in_emf` is the share that it lacks.
     """
 
     name: str
