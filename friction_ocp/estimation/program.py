@@ -65,6 +65,20 @@ class Linearisation:
 
 
 @dataclass(frozen=True)
+class Tether:
+    """What holds parameters near a point, beside their priors: what is known of them from elsewhere."""
+
+    theta: FloatArray
+    """(parameters,) the point."""
+    root: FloatArray
+    """(k, parameters) R, with R'R the information."""
+
+    def errors(self, theta: FloatArray) -> FloatArray:
+        """Return (k,) residuals."""
+        return self.root @ (theta - self.theta)
+
+
+@dataclass(frozen=True)
 class Program:
     """A least-squares program over parameters and node states."""
 
@@ -80,6 +94,7 @@ class Program:
     loss: AbstractLoss = Squares()
     static: tuple[StaticTerm, ...] = ()
     """Static points: residuals of the parameters alone, always squared."""
+    tether: Tether | None = None
 
     @property
     def without_nodes(self) -> bool:
@@ -273,14 +288,17 @@ class Program:
 
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
-        total = _prior_cost(self.space, point.theta) + self._static_cost(point.theta)
+        total = self._parameter_cost(point.theta)
         for index, (result, score) in enumerate(self._scored(point, self.measured_starts(point.theta))):
             total += float(np.sum(score.cost)) + 0.5 * float(np.sum(self.start_errors(index, point) ** 2))
             total += 0.5 * float(np.sum(self.gap_errors(index, point, result.end) ** 2))
         return total if np.isfinite(total) else np.inf
 
-    def _static_cost(self, theta: FloatArray) -> float:
-        return sum(term.cost(self.space, theta) for term in self.static)
+    def _parameter_cost(self, theta: FloatArray) -> float:
+        """Return the cost of what hangs on the parameters alone."""
+        held = np.zeros(0) if self.tether is None else self.tether.errors(theta)
+        points = sum(term.cost(self.space, theta) for term in self.static)
+        return _prior_cost(self.space, theta) + points + 0.5 * float(held @ held)
 
     def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
         """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
@@ -295,13 +313,14 @@ class Program:
         return cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)
 
     def parameter_terms(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Return cost, Hessian and gradient of what hangs on the parameters alone: priors and static points."""
+        """Return cost, Hessian and gradient of what hangs on the parameters alone: priors, static points, a tether."""
         stated = np.isfinite(self.space.prior_std)
         pull = np.where(stated, np.where(stated, self.space.prior_std, 1.0) ** -2.0, 0.0)
-        total = _prior_cost(self.space, theta)
         hessian, gradient = np.diag(pull), pull * (theta - self.space.prior_mean)
-        for term in self.static:
-            errors, slope = term.residuals(self.space, theta)
+        terms = [term.residuals(self.space, theta) for term in self.static]
+        terms += [] if self.tether is None else [(self.tether.errors(theta), self.tether.root)]
+        total = _prior_cost(self.space, theta)
+        for errors, slope in terms:
             total += 0.5 * float(errors @ errors)
             hessian += slope.T @ slope
             gradient += slope.T @ errors
