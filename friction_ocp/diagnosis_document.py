@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.clues import clues_of
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key, Round
+from friction_ocp.diagnosis.diagnose import Diagnosis, Round
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
@@ -24,6 +24,7 @@ from friction_ocp.diagnosis.worth import samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor

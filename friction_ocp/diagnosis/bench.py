@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.base_fit import fit_base, predicting
-from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
-from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
@@ -35,7 +33,6 @@ from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.plain import plain, restored
 from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Outcome, Task
-from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.workshop import Workshop
@@ -177,21 +174,6 @@ def footing_document(foot: Footing) -> Json:
 def restored_footing(content: Json, model: Model) -> Footing:
     """Return the footing with the recordings of the base model."""
     return Footing(**restored(content, LOSSES), train=training_pieces(model))
-
-
-def blocks_like(current: FittedModel, fitted: FittedModel, blocks: Blocks) -> FloatArray:
-    """Return (blocks,) held-out costs of a refitted candidate over the blocks of the model without it."""
-    rows, reference = fitted.linear.rows, current.linear.rows
-    costs = held_out(fitted)
-    totals = np.zeros(blocks.count)
-    for recording in np.unique(blocks.recording):
-        own = (reference.recording == recording) & (blocks.of_row >= 0)
-        numbers, starts = blocks.of_row[own], reference.time[own]
-        mine = rows.recording == recording
-        order = np.argsort(starts, kind="stable")
-        at = np.clip(np.searchsorted(starts[order], rows.time[mine], side="right") - 1, 0, order.size - 1)
-        np.add.at(totals, numbers[order][at], costs[mine])
-    return totals
 
 
 def open_bench(problem: Problem, execution: Execution) -> Bench:

@@ -11,7 +11,8 @@ from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Round, gave_shape
-from friction_ocp.diagnosis.worth import Key, samples, with_resembling
+from friction_ocp.diagnosis.worth import samples, with_resembling
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 
 FINISHED, CLOSE = 2, 1.5

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, blocks_like, point_document, seated, value_of
+from friction_ocp.diagnosis.bench import Bench, Tell, point_document, seated, value_of
+from friction_ocp.diagnosis.benchmark import blocks_like
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, fitted_loosely, quick_refit
-from friction_ocp.diagnosis.rival import Rival, Standing
+from friction_ocp.diagnosis.rival import Rival, Standing, is_another
 from friction_ocp.diagnosis.screen import Screened, Start, screen
-from friction_ocp.diagnosis.worth import Key
-from friction_ocp.effects.effect import Augmentation, Trial
+from friction_ocp.effects.effect import Augmentation, Key, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.execution.plain import plain, restored
@@ -39,7 +39,7 @@ class Refit:
     cost: float
 
     @property
-    def key(self) -> tuple[str, str]:
+    def key(self) -> Key:
         """Effect and component."""
         return self.screened.key
 
@@ -55,17 +55,17 @@ class Crew:
     readings: OtherReadings | None = None
     """What is fitted beside the refits."""
 
-    def screened(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+    def screened(self, candidates: Sequence[Key]) -> list[Screened]:
         """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
         tasks = [self._task("screen", key, screen_candidate, key) for key in candidates]
         return self._tested("screening", tasks, 0.0)
 
-    def screened_unfitted(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+    def screened_unfitted(self, candidates: Sequence[Key]) -> list[Screened]:
         """Return the score tests at the guesses, largest predicted gain first; none where these do not simulate."""
         tasks = [self._task("guess", key, screen_unfitted, key) for key in candidates]
         return self._tested("screening from the guesses", tasks, 0.25)
 
-    def screened_loosely(self, candidates: Sequence[tuple[str, str]]) -> list[Screened]:
+    def screened_loosely(self, candidates: Sequence[Key]) -> list[Screened]:
         """Return the score tests on loosely joined segments, largest predicted gain first; none where there are none.
 
         Gains are in units of what such gaps allow: they compare with one another alone.
@@ -102,7 +102,7 @@ class Crew:
         ends = values[len(aside) :]
         if self.readings is not None:
             self.readings.keep(self.bench, values[: len(aside)])
-        best = dict[tuple[str, str], Refit]()
+        best = dict[Key, Refit]()
         for item, end in zip([*shortlist, *unfitted], ends, strict=True):
             cost = np.inf if end is None else float(restored(end["cost"]))
             if end is not None and (item.key not in best or cost < best[item.key].cost):
@@ -151,7 +151,7 @@ class Crew:
         standing, costs = restored(value["standing"], (Standing,)), restored(value["costs"])
         return Rival(screened, standing, without - costs, partial(seat_candidate, self.bench, screened, value["point"]))
 
-    def _task(self, what: str, key: tuple[str, str], function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
+    def _task(self, what: str, key: Key, function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
         return Task(f"{self.number}-{what}-{key[0]}-{key[1]}", function, arguments)
 
     def _run(self, what: str, tasks: Sequence[Task], begin: float) -> list[Json]:
@@ -239,10 +239,8 @@ def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> 
 
 def _judged(bench: Bench, item: Screened, fitted: FittedModel, asked: float) -> Json:
     enough = not bench.current.cost - fitted.cost < asked
-    blocks = bench.current.blocks
-    costs = blocks_like(bench.current, fitted, blocks) if enough else np.full(blocks.count, np.nan)
-    found = enough and not any(fitted.at_bound(path) for path in item.augmentation.inside)
-    standing = Standing.of(fitted, found and bench.standard.is_material(fitted))
+    costs = blocks_like(bench.current, fitted) if enough else np.full(bench.current.blocks.count, np.nan)
+    standing = Standing.of(fitted, enough and not is_another(item, fitted) and bench.standard.is_material(fitted))
     return {"point": point_document(fitted), "costs": plain(costs), "standing": plain(standing)}
 
 

@@ -47,11 +47,8 @@ class FittedModel:
 
     def at_bound(self, name: str) -> bool:
         """Whether a parameter lies at one of its bounds; not where its value is stated."""
-        if name not in self.model.space.names:
-            return False
         low, high = self.model.space.ends(self.theta)
-        at = self.model.space.names.index(name)
-        return bool(low[at] | high[at])
+        return bool(dict(zip(self.model.space.names, low | high, strict=True)).get(name, False))
 
     @property
     def objective(self) -> float:

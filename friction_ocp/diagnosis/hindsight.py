@@ -9,7 +9,8 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.select import Choice, Round
-from friction_ocp.diagnosis.worth import Key, samples
+from friction_ocp.diagnosis.worth import samples
+from friction_ocp.effects.effect import Key
 
 MIMICKED = 0.015
 """Probability that what leaves nothing stands in for something outside the catalogue: it did in 4 of the 266 cases of

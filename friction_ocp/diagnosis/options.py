@@ -9,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from friction_ocp.diagnosis.bench import Bench, blocks_like, open_predicting
+from friction_ocp.diagnosis.bench import Bench, open_predicting
+from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.polishing import polished
 from friction_ocp.diagnosis.refit import completed
-from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.rival import Rival, is_another
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Choice, Round
 from friction_ocp.estimation.model import with_drive
@@ -60,13 +58,16 @@ def _in_free_runs(bench: Bench, item: Round) -> Round | None:
     model = with_drive(current.model, rival.screened.augmentation.drive)
     start = model.space.with_known({**current.values, **rival.standing.values})
     fitted = completed(polished(model, current.footing, start, None))
-    if not fitted.holds or fitted.cost >= current.cost:
+    if not fitted.holds or fitted.cost >= current.cost or is_another(rival.screened, fitted):
         return None
-    blocks = current.blocks
-    gains = blocks.sums(held_out(current)) - blocks_like(current, fitted, blocks)
-    own = Rival.of(rival.screened, fitted, np.asarray(gains))
-    chance = dict(zip((one.key for one in item.choice.rivals), item.choice.probabilities, strict=True))[rival.key]
+    own = Rival.of(rival.screened, fitted, -Benchmark(current).dearer(fitted))
+    chance = item.choice.chances[rival.key]
     choice = Choice((own,), (chance,), 1.0 - chance, True, (own,), (own,))
     return replace(
-        item, screened=(), choice=choice, before=current, excess=excess(current.linear.rows, blocks), accepted=own
+        item,
+        screened=(),
+        choice=choice,
+        before=current,
+        excess=excess(current.linear.rows, current.blocks),
+        accepted=own,
     )

@@ -14,8 +14,9 @@ from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.polishing import polished, timed
-from friction_ocp.diagnosis.worth import OF_REST, Key, innovations
+from friction_ocp.diagnosis.worth import OF_REST, innovations
 from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late

@@ -5,29 +5,28 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import Bench, blocks_like, point_document, seated, value_of
-from friction_ocp.diagnosis.blocks import Blocks
+from friction_ocp.diagnosis.bench import Bench, point_document, seated, value_of
+from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.held_out import folds, held_out
+from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.led_back import led_back
-from friction_ocp.diagnosis.polishing import UNIMPORTANT, loosely, polished, timed
+from friction_ocp.diagnosis.polishing import loosely, polished, timed
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
-from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Round, choose, gave_shape, resamples, schwarz, turned
-from friction_ocp.diagnosis.worth import ALMOST, OF_ALL, Key, may_grow, required, samples
+from friction_ocp.diagnosis.rival import Rival, is_another, is_same
+from friction_ocp.diagnosis.select import Round, choose, gave_shape, turned
+from friction_ocp.diagnosis.worth import ALMOST, OF_ALL, may_grow, required, samples
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Task
-from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.execution import Execution
 
 TRIED = 2
@@ -58,7 +57,7 @@ def without_superfluous(
     Superfluous is what neither gains for certain there nor is worth an addition in sum; beside what leaves no more than
     noise, what is not worth its parameters.
     """
-    current, benchmark = bench.current, _Benchmark(bench.current)
+    current, benchmark = bench.current, Benchmark(bench.current)
     earlier = list(dict.fromkeys(accepted[:-1]))
     known = _fits(bench, run, {key: _Wanted(_less(accepted, key)) for key in earlier})
     for key in earlier:
@@ -69,7 +68,7 @@ def without_superfluous(
         gains = benchmark.dearer(simpler)
         little = float(np.sum(gains)) < required(bench.base, simpler) or benchmark.simpler(simpler)
         if little and not benchmark.certain(gains, level, rng):
-            current, accepted, benchmark = simpler, kept, _Benchmark(simpler)
+            current, accepted, benchmark = simpler, kept, Benchmark(simpler)
     return current, accepted
 
 
@@ -102,7 +101,7 @@ def exchanged(
     that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed again:
     beside all that was missing then a small difference looked like a large one.
     """
-    done, current, benchmark = list(rounds), bench.current, _Benchmark(bench.current)
+    done, current, benchmark = list(rounds), bench.current, Benchmark(bench.current)
     wanted = dict[tuple[Key, Key], _Wanted]()
     for index, item in enumerate(done[:-1]):
         held = item.accepted
@@ -125,13 +124,13 @@ def exchanged(
                 swapped = known[held.key, rival.key]
             else:
                 swapped = _fitted(bench, current, keys, rival.standing.values)
-            if swapped is None or not swapped.holds:
+            if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
                 continue
             gains = -benchmark.dearer(swapped)
             if benchmark.beaten(swapped, gains, level, rng) or benchmark.simpler(swapped):
                 seen.add(held.key)
                 former = [held.refitted(current, gains), *tried]
-                held, current, accepted, benchmark = rival, swapped, keys, _Benchmark(swapped)
+                held, current, accepted, benchmark = rival, swapped, keys, Benchmark(swapped)
                 item = replace(item, accepted=rival, choice=turned(item.choice, rival))
                 tried = [other.refitted(other.fitted, -benchmark.dearer(other.fitted)) for other in former]
                 others = _others(bench, item, accepted, seen)
@@ -139,15 +138,9 @@ def exchanged(
                 tried.append(rival.refitted(swapped, gains))
         done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
         if leader is not None:
-            current, benchmark = leader.fitted, _Benchmark(leader.fitted)
+            current, benchmark = leader.fitted, Benchmark(leader.fitted)
             accepted = made[leader.key]
     return current, done, accepted
-
-
-def beats(other: FittedModel, current: FittedModel, level: float, rng: np.random.Generator) -> bool:
-    """Whether another model explains more than the current one for certain, on recordings left out."""
-    benchmark = _Benchmark(current)
-    return benchmark.beaten(other, -benchmark.dearer(other), level, rng)
 
 
 @dataclass(frozen=True)
@@ -253,7 +246,7 @@ def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapp
 
 
 def _weighed_again(
-    item: Round, held: Rival, benchmark: _Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
+    item: Round, held: Rival, benchmark: Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
 ) -> tuple[Round, Rival | None]:
     """Return a round with the chances that rivals have in the place of what it `held`, now that others are in.
 
@@ -263,7 +256,7 @@ def _weighed_again(
     """
     if not tried:
         return item, None
-    known = dict(zip((rival.key for rival in item.choice.rivals), item.choice.probabilities, strict=True))
+    known = item.choice.chances
     best = max(float(np.nansum(rival.gains)) for rival in (held, *item.choice.rivals))
     worth = np.full(benchmark.blocks.count, best / benchmark.blocks.count)
     own = held.refitted(benchmark.fitted, worth)
@@ -271,7 +264,7 @@ def _weighed_again(
     again = choose([own, *others], benchmark.blocks, len(folds(benchmark.fitted)), level, rng)
     keys = {rival.key for rival in again.rivals}
     shared = sum(known[key] for key in keys) / sum(again.probabilities)
-    known |= {rival.key: shared * chance for rival, chance in zip(again.rivals, again.probabilities, strict=True)}
+    known |= {key: shared * chance for key, chance in again.chances.items()}
     leader = again.rivals[0]
     aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]
     aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
@@ -284,36 +277,3 @@ def _weighed_again(
         same=(leader, *(rival for rival in again.rivals if rival is not leader and is_same(rival, leader))),
     )
     return replace(item, accepted=order[0], choice=choice), None if leader is own else leader
-
-
-@dataclass(frozen=True)
-class _Benchmark:
-    """A model that others are compared with on recordings left out; it is looked at once."""
-
-    fitted: FittedModel
-
-    @property
-    def blocks(self) -> Blocks:
-        """Blocks of its residuals."""
-        return self.fitted.blocks
-
-    @cached_property
-    def _costs(self) -> FloatArray:
-        return self.blocks.sums(held_out(self.fitted))
-
-    def dearer(self, other: FittedModel) -> FloatArray:
-        """Return (blocks,) what another model costs more than this one."""
-        return blocks_like(self.fitted, other, self.blocks) - self._costs
-
-    def simpler(self, other: FittedModel) -> bool:
-        """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
-        fewer = self.fitted.determined - other.determined
-        return fewer > 0 and other.cost - self.fitted.cost < schwarz(self.blocks) * fewer
-
-    def beaten(self, other: FittedModel, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
-        """Whether another model explains more, and its (blocks,) gains are more than chance."""
-        return other.cost < self.fitted.cost - UNIMPORTANT and self.certain(gains, level, rng)
-
-    def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
-        """Whether gains in the blocks of this model are more than chance makes of nothing."""
-        return bool(np.quantile(resamples(self.blocks, rng) @ gains, level) > 0)

@@ -10,10 +10,16 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.effects.effect import Key
 from friction_ocp.simulation.grid import FloatArray
 
 TOLD = 3.0
 """Log-likelihood between two sets of residuals from which recordings tell them apart: odds of 20 to 1."""
+
+
+def is_another(screened: Screened, fitted: FittedModel) -> bool:
+    """Whether the parameters of a candidate end where they mean another effect."""
+    return any(fitted.at_bound(path) for path in screened.augmentation.inside)
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Rival:
         return cls(screened, Standing.of(fitted), gains, lambda: fitted)
 
     @property
-    def key(self) -> tuple[str, str]:
+    def key(self) -> Key:
         """Effect and component."""
         return self.screened.key
 

@@ -12,7 +12,7 @@ from friction_ocp.diagnosis.contrast import Contrast, contrast
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial
+from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Key, Trial
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
@@ -60,7 +60,7 @@ class Screened:
         return self.starts[0].added(self.augmentation.off) if self.starts else {}
 
     @property
-    def key(self) -> tuple[str, str]:
+    def key(self) -> Key:
         """Effect and component."""
         return self.effect, self.component
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
+from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
@@ -20,14 +21,13 @@ from friction_ocp.diagnosis.left_out import left_out_before_and_after
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
-from friction_ocp.diagnosis.reexamine import beats, exchanged, gone_back, without_small, without_superfluous
+from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn, without
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.stand_ins import fall_short, helps
 from friction_ocp.diagnosis.worth import (
-    Key,
     gain,
     innovations,
     may_grow,
@@ -36,6 +36,7 @@ from friction_ocp.diagnosis.worth import (
     shapes,
     shortlist,
 )
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution

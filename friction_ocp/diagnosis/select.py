@@ -12,6 +12,7 @@ from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.screen import Screened
+from friction_ocp.effects.effect import Key
 from friction_ocp.simulation.grid import FloatArray
 
 RESAMPLES = 2000
@@ -38,6 +39,11 @@ class Choice:
     """The best rivals: the smallest set that is sure to hold the best."""
     same: tuple[Rival, ...] = ()
     """The best rival and all that leave the same residuals."""
+
+    @property
+    def chances(self) -> dict[Key, float]:
+        """The probability of each rival to be the best, by effect and component."""
+        return dict(zip((rival.key for rival in self.rivals), self.probabilities, strict=True))
 
 
 NOTHING = Choice((), (), 1.0, False, ())
@@ -138,8 +144,7 @@ def withdrawn(item: Round) -> Round:
 def turned(choice: Choice, rival: Rival) -> Choice:
     """Return a choice that another rival has won, for certain: it and the first have changed places."""
     order = [rival, *(other for other in choice.rivals if other is not rival)]
-    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
-    first = choice.rivals[0].key
+    chances, first = choice.chances, choice.rivals[0].key
     chances[first], chances[rival.key] = chances[rival.key], chances[first]
     found = tuple(chances[item.key] for item in order)
     return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=(rival,))
@@ -152,9 +157,9 @@ def with_first(choice: Choice, rival: Rival) -> Choice:
     return replace(turned(choice, rival), aliases=aliases, same=same)
 
 
-def without(choice: Choice, beaten: Collection[tuple[str, str]]) -> Choice:
+def without(choice: Choice, beaten: Collection[Key]) -> Choice:
     """Return a choice in which some rivals take part no more; their chances are the first's."""
-    chances = dict(zip((item.key for item in choice.rivals), choice.probabilities, strict=True))
+    chances = choice.chances
     freed = sum(chances.pop(key) for key in {*beaten} & {*chances})
     first = choice.rivals[0].key
     chances[first] = chances.get(first, 0.0) + freed

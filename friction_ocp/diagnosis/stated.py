@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.bench import blocks_like
+from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import Considered
 from friction_ocp.diagnosis.polishing import polished
@@ -19,11 +18,10 @@ from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz
-from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
-from friction_ocp.effects.effect import Augmentation
+from friction_ocp.effects.effect import Augmentation, Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.effects.torques import mode_of
 from friction_ocp.estimation.model import with_drive
@@ -54,7 +52,7 @@ def contradictions(fitted: FittedModel) -> list[Contradiction]:
     space = fitted.model.space
     distance = _distance(fitted)
     drive = fitted.model.problem.drive
-    found: dict[tuple[str, str], Contradiction] = {}
+    found: dict[Key, Contradiction] = {}
     for k in np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED)):
         name, far = space.names[k], float(distance[k])
         key = _key(name.partition("@")[0], drive)
@@ -105,7 +103,7 @@ def _lightened(fitted: FittedModel, shaft: str) -> float:
     return float(stated - fitted.theta[k])
 
 
-def _key(path: str, drive: Drive) -> tuple[str, str]:
+def _key(path: str, drive: Drive) -> Key:
     """Return effect and component of a parameter that is not as stated."""
     part, _, rest = path.partition(".")
     if any(item.name == part for item in drive.channels):
@@ -121,16 +119,15 @@ def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Consi
     It is a part whose fitted values are far from what is stated for them, or one whose values are fixed: fitted ones
     may have given way to it. Every value that is taken back costs what Schwarz 1978 asks for.
     """
-    blocks = current.blocks
-    each, without = schwarz(blocks), blocks.sums(held_out(current))
+    benchmark = Benchmark(current)
+    each = schwarz(benchmark.blocks)
     best = dict[Key, tuple[float, Rival]]()
     narrowed = not set(STATED).isdisjoint(meant.names)
     released = [item for item in found if not narrowed or meant.holds(item.effect, item.component)]
     for count, seen, fitted in [*_released(current, released), *_freed(current, found, meant)]:
-        gains = without - blocks_like(current, fitted, blocks)
         score = fitted.cost + count * each
         if seen.key not in best or score < best[seen.key][0]:
-            best[seen.key] = score, Rival.of(seen, fitted, gains)
+            best[seen.key] = score, Rival.of(seen, fitted, -benchmark.dearer(fitted))
     if not best:
         return None
     scores, ordered = zip(*sorted(best.values(), key=lambda pair: pair[0]), strict=True)

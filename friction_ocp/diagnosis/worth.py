@@ -14,7 +14,7 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer, free_error
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.drive.parts import Drive
-from friction_ocp.effects.effect import Clues
+from friction_ocp.effects.effect import Clues, Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import once
 
@@ -37,9 +37,6 @@ free runs show there has one cause."""
 ALMOST = 0.9
 """Share of what the innovations have beyond noise from which free runs do not speak against an addition: what is left
 beside it moves them, too."""
-
-Key = tuple[str, str]
-"""Effect and component."""
 
 
 def shapes(current: FittedModel, clues: Clues, accepted: Sequence[Key]) -> list[Key]:

@@ -100,7 +100,7 @@ def dae(drive: Drive, width: float) -> Dae:
 def _symbols(mech: Mechanism) -> _Symbols:
     counts = (
         *(mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names),
-        *(mech.lagging, mech.looping, mech.warming),
+        *(mech.lagging, mech.loop_names, mech.warming),
     )
     names = iter(mech.state_names)
     angles, speeds, bristle, *others = (column([symbol(next(names)) for _ in part]) for part in counts)
@@ -158,12 +158,13 @@ def _state_unit(mech: Mechanism, name: str) -> str:
     if drive.controller is not None and part == "controller":
         return command_unit(drive, drive.controller)
     if signal == "lagged":
-        return signal_unit(drive, f"{part}.{mech.driving_signal(drive.motor(part))}")
+        return signal_unit(drive, f"{part}.{mech.drive.driving_signal(drive.motor(part))}")
     if name.endswith(WARMTH):
         return si_unit("dimensionless")
-    if signal == "hysteresis.z":
+    twisted = signal.startswith("hysteresis.z")
+    if twisted:
         part = next(item.to_shaft for item in mech.looping if item.name == part)
-    deflected = signal == "hysteresis.z" or signal.startswith("friction.z")
+    deflected = twisted or signal.startswith("friction.z")
     return si_unit("angle", drive.shaft(part).motion) if deflected else signal_unit(drive, name)
 
 

@@ -45,7 +45,7 @@ def holding_effort(mech: Mechanism, motor: Motor, at: Motion, holding: Mapping[i
     helpers = [
         item
         for item in mech.drive.motors
-        if mech.topology.group_of[item.shaft] == group and mech.driving_signal(item) is None
+        if mech.topology.group_of[item.shaft] == group and mech.drive.driving_signal(item) is None
     ]
     together = sum(mech.speed_ratio(item.shaft, at) * item.share for item in helpers)
     torque = holding[group] * motor.share / together
@@ -74,7 +74,7 @@ def _held_group(mech: Mechanism, channel: Channel) -> int | None:
     if channel.signal == DRIVE_TORQUE:
         return mech.topology.group_of[channel.part]
     motor = next((item for item in mech.drive.motors if item.name == channel.part), None)
-    if motor is None or channel.signal not in ("torque", "current") or mech.driving_signal(motor) is not None:
+    if motor is None or channel.signal not in ("torque", "current") or mech.drive.driving_signal(motor) is not None:
         return None
     group = mech.topology.group_of[motor.shaft]
     return group if group in mech.prescribed else None

@@ -124,7 +124,7 @@ def _deflections(shaft: Shaft, omega: float) -> list[float]:
     if not shaft.friction.law.has_bristle:
         return []
     if omega == 0.0:
-        return [0.0] * shaft.friction.law.bristle_count
+        return [0.0] * len(shaft.friction.law.deflections)
     bent = np.asarray(ca.DM(ca.SX(shaft.friction.steady_deflection(ca.SX(omega)))), dtype=float)
     return [float(one) for one in bent.ravel()]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Protocol, TypeVar
 
 from friction_ocp.drive.parts import SHARPNESS, Channel, Drive, Motor, Shaft, Transmission
+from friction_ocp.friction.composite import Bristled
 from friction_ocp.parameters import Value, is_off
 
 
@@ -39,17 +40,21 @@ def _on(value: Value) -> Value:
 def _shaft(shaft: Shaft) -> Shaft:
     friction, warm_up = shaft.friction, _live(shaft.friction.warm_up)
     warm_up = None if warm_up is None else warm_up.live()
-    friction = replace(friction, ripple=_live(friction.ripple), warm_up=warm_up)
+    law = friction.law
+    if isinstance(law, Bristled):
+        law = replace(law, bristle=replace(law.bristle, springs=_live(law.bristle.springs)))
+    friction = replace(friction, law=law, ripple=_live(friction.ripple), warm_up=warm_up)
     return replace(shaft, friction=friction, disturbance=_live(shaft.disturbance))
 
 
 def _transmission(item: Transmission) -> Transmission:
+    loop = _live(item.hysteresis)
     return replace(
         item,
         backlash=_on(item.backlash),
         stiffening=_on(item.stiffening),
         second_stage=_live(item.second_stage),
-        hysteresis=_live(item.hysteresis),
+        hysteresis=None if loop is None else replace(loop, springs=_live(loop.springs)),
         kinematic_error=_live(item.kinematic_error),
     )
 

@@ -14,6 +14,7 @@ import casadi as ca
 from friction_ocp.drive.control import has_integral, memory_names
 from friction_ocp.drive.inputs import TIME, input_symbols, moved_from_behind
 from friction_ocp.drive.live_terms import live_terms
+from friction_ocp.drive.loops import Loop
 from friction_ocp.drive.parts import Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.topology import Topology, topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
@@ -36,9 +37,8 @@ def symbol(name: str) -> ca.SX:
 
 
 def deflection_names(shaft: Shaft) -> tuple[str, ...]:
-    """Return the names of a shaft's bristle states: z, or z1, z2, ... where there are several."""
-    count = shaft.friction.law.bristle_count
-    return tuple(f"{shaft.name}.friction.z{k + 1 if count > 1 else ''}" for k in range(count))
+    """Return the names of a shaft's bristle states."""
+    return tuple(f"{shaft.name}.friction.{name}" for name in shaft.friction.law.deflections)
 
 
 def column(items: list[Any]) -> ca.SX:
@@ -105,7 +105,7 @@ class Mechanism:
 
     def deflections(self, bristle: ca.SX) -> dict[str, Any]:
         """Return the bristle states by shaft: (1,), or a column where a shaft has several."""
-        counts = [shaft.friction.law.bristle_count for shaft in self.bristles]
+        counts = [len(shaft.friction.law.deflections) for shaft in self.bristles]
         pieces = ca.vertsplit(bristle, [sum(counts[:k]) for k in range(len(counts) + 1)]) if counts else []
         return {shaft.name: piece for shaft, piece in zip(self.bristles, pieces, strict=True)}
 
@@ -121,12 +121,28 @@ class Mechanism:
     @property
     def lagging(self) -> tuple[Motor, ...]:
         """Motors that follow their commands late."""
-        return tuple(motor for motor in self.drive.motors if motor.lag is not None and self.driving_signal(motor))
+        return tuple(motor for motor in self.drive.motors if motor.lag is not None and self.drive.driving_signal(motor))
 
     @property
     def looping(self) -> tuple[Transmission, ...]:
         """Elastic transmissions whose twist has a loop."""
         return tuple(item for item in self.topology.elastic if item.hysteresis is not None)
+
+    @property
+    def loop_names(self) -> tuple[str, ...]:
+        """Names of the deflections of loops."""
+        parts = ((item.name, item.hysteresis) for item in self.looping)
+        return tuple(f"{name}.hysteresis.{z}" for name, loop in parts if loop is not None for z in loop.deflections)
+
+    def loops(self, deflections: ca.SX) -> dict[str, Loop]:
+        """Return the loops by transmission, with the deflections that are states."""
+        found: dict[str, Loop] = {}
+        rest = ca.vertsplit(deflections) if deflections.numel() else []
+        for item in self.looping:
+            assert item.hysteresis is not None
+            count = len(item.hysteresis.deflections)
+            found[item.name], rest = Loop(item.hysteresis, tuple(rest[:count])), rest[count:]
+        return found
 
     @property
     def warming(self) -> dict[str, WarmUp]:
@@ -149,7 +165,7 @@ class Mechanism:
             *self.bristle_names,
             *self.extra_names,
             *(f"{motor.name}.lagged" for motor in self.lagging),
-            *(f"{item.name}.hysteresis.z" for item in self.looping),
+            *self.loop_names,
             *(name + WARMTH for name in self.warming),
             *self.memory_names,
         )
@@ -274,11 +290,7 @@ class Mechanism:
 
     def has_winding_state(self, motor: Motor) -> bool:
         """Whether the current of a motor is a state: driven by voltage through an inductance."""
-        return motor.inductance is not None and self.driving_signal(motor) == "voltage"
-
-    def driving_signal(self, motor: Motor) -> str | None:
-        """Return what drives a motor: torque, current or voltage; None where nothing does."""
-        return self.drive.driving_signal(motor)
+        return motor.inductance is not None and self.drive.driving_signal(motor) == "voltage"
 
 
 FEEDBACK_DELAY = "controller.feedback_delay"

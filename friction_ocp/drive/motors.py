@@ -22,7 +22,7 @@ LEAST_SLOPE = 0.1
 
 def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque that current makes in a motor, 0 while it is not enabled; cogging is apart from it."""
-    if mech.driving_signal(motor) == "torque":
+    if mech.drive.driving_signal(motor) == "torque":
         torque = _enabled(mech, motor, _driving(mech, motor, motion))
         left = _left_of_torque(motor, torque / motor.torque_constant)
         return torque * left * torque_ripple_factor(mech, motor, motion)
@@ -72,7 +72,7 @@ def _enabled(mech: Mechanism, motor: Motor, value: Any) -> Any:
 
 def motor_current(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
     """Return the winding current, 0 while the motor is not enabled; None for a motor not driven electrically."""
-    signal = mech.driving_signal(motor)
+    signal = mech.drive.driving_signal(motor)
     if mech.has_winding_state(motor):
         current = motion.extra[mech.extra_names.index(f"{motor.name}.current")]
     elif signal == "current":
@@ -106,7 +106,7 @@ def _settled_current(motor: Motor, voltage: Any, back_emf: Any) -> Any:
 
 def motor_voltage(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
     """Return the terminal voltage of a motor that is driven by it; a duty controller scales the supply voltage."""
-    return _driving(mech, motor, motion) if mech.driving_signal(motor) == "voltage" else None
+    return _driving(mech, motor, motion) if mech.drive.driving_signal(motor) == "voltage" else None
 
 
 def _driving(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -119,7 +119,7 @@ def _driving(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
 
 def motor_command(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     """Return the torque, current or voltage that a motor is to follow."""
-    given, controller = mech.true_input(f"{motor.name}.{mech.driving_signal(motor)}"), mech.drive.controller
+    given, controller = mech.true_input(f"{motor.name}.{mech.drive.driving_signal(motor)}"), mech.drive.controller
     if given is None and controller is None:
         given = mech.true_input(f"{motor.name}.current_command")
     if given is not None:
@@ -144,7 +144,7 @@ def commands(mech: Mechanism, motion: Motion) -> ca.SX:
 
 def shown_lag(mech: Mechanism, motor: Motor, motion: Motion, signal: str) -> Motion:
     """Return the motion with what drives a motor as far behind its command as a recording of that signal shows it."""
-    if motor.lag is None or motor.lag_hidden is None or mech.driving_signal(motor) != signal:
+    if motor.lag is None or motor.lag_hidden is None or mech.drive.driving_signal(motor) != signal:
         return motion
     assert motion.lagged is not None
     hidden = column([motor.lag_hidden if item.name == motor.name else 0.0 for item in mech.lagging])

@@ -11,6 +11,7 @@ from math import sqrt
 from typing import Any, Literal
 
 from friction_ocp.friction.element import FrictionElement
+from friction_ocp.friction.maxwell import STIFFNESSES, Spring, SpringShares
 from friction_ocp.friction.smoothing import cos, sin
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.friction.wave import Wave
@@ -103,16 +104,34 @@ class Shaft:
 
 
 @dataclass(frozen=True)
+class LoopSprings(SpringShares):
+    """Springs that slip, beside a bristle in a transmission."""
+
+    twist: Value = quantity("angle", "twist after which the middle spring slips")
+
+    def under(self, torque: Any) -> tuple[Spring, ...]:
+        """Return the springs of a loop of some torque."""
+        reaches = [self.twist / factor for factor in STIFFNESSES]
+        return tuple(Spring(torque * share / reach, reach) for reach, share in zip(reaches, self.shares, strict=True))
+
+
+@dataclass(frozen=True)
 class Hysteresis:
     r"""A bristle between two shafts, beside the spring: the twist has a loop.
 
     .. math:: \dot z = r - |r| z / \text{twist}, \qquad \tau = \text{torque} \cdot z / \text{twist}
 
-    r is the rate of the twist. Source: Dahl 1968, with exponent 1.
+    r is the rate of the twist. Source: Dahl 1968, with exponent 1. Springs that slip take their shares of the torque.
     """
 
     torque: Value = quantity("torque", "torque of the loop")
     twist: Value = quantity("angle", "twist over which the loop turns", nested="guess")
+    springs: LoopSprings | None = None
+
+    @property
+    def deflections(self) -> tuple[str, ...]:
+        """Names of its states."""
+        return ("z", *(() if self.springs is None else self.springs.deflections))
 
     @property
     def idle(self) -> bool:

@@ -32,7 +32,7 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         column(deflections),
         at.extra,
         lagged,
-        ca.SX.zeros(len(mech.looping)),
+        ca.SX.zeros(len(mech.loop_names)),
         column([warm_up.risen(mech.inputs[TIME]) for warm_up in mech.warming.values()]),
         column(memory),
     )
@@ -61,7 +61,8 @@ def _deflection(mech: Mechanism, shaft: Shaft, at: Motion, acceleration: dict[in
     element = shaft.friction.under(mech.surroundings(shaft, at))
     omega = mech.shaft_speed(shaft.name, at)
     steady, group = element.steady_deflection(omega), mech.topology.group_of[shaft.name]
-    alone = isinstance(element.law, AbstractBristleLaw) and _rubs_alone(mech, shaft)
+    single = isinstance(element.law, AbstractBristleLaw) and len(element.law.deflections) == 1
+    alone = single and _rubs_alone(mech, shaft)
     if not alone or mech.topology.elastic or group in mech.prescribed or group not in acceleration:
         return steady
     torques = applied_torques(mech, at, 0.0)

@@ -104,7 +104,7 @@ def state_symbols(mech: Mechanism) -> State:
         len(mech.bristle_names),
         len(mech.extra_names),
         len(mech.lagging),
-        len(mech.looping),
+        len(mech.loop_names),
         len(mech.warming),
         len(mech.memory_names),
     )
@@ -302,7 +302,7 @@ def _signal(
         return drive_torque(mech, channel.part, at, holding), 0.0, 0.0
     motor = mech.drive.motor(channel.part)
     at = shown_lag(mech, motor, at, channel.signal)
-    if mech.topology.group_of[motor.shaft] in holding and mech.driving_signal(motor) is None:
+    if mech.topology.group_of[motor.shaft] in holding and mech.drive.driving_signal(motor) is None:
         return holding_effort(mech, motor, at, holding, channel.signal), 0.0, 0.0
     value = {
         "current": motor_current,

@@ -10,7 +10,7 @@ from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, symbol
 from friction_ocp.drive.motors import cogging_torque, motor_torque
 from friction_ocp.drive.parts import SecondStage, Shaft, Transmission
-from friction_ocp.friction.smoothing import decay_means, smooth_abs, soft_threshold, sqrt, where
+from friction_ocp.friction.smoothing import smooth_abs, soft_threshold, sqrt, where
 
 
 def applied_torques(mech: Mechanism, motion: Motion, corner: Any) -> dict[str, Any]:
@@ -94,35 +94,25 @@ def _loop_torque(mech: Mechanism, item: Transmission, motion: Motion, rate: Any)
     """Return the torque of a loop, its mean over a step at constant rate where there is a step."""
     if item.hysteresis is None or motion.loops is None:
         return 0.0
-    deflection = motion.loops[[one.name for one in mech.looping].index(item.name)]
-    if motion.steady is not None:
-        kept, added = decay_means(motion.h * forgetting_rate(mech, item, motion, motion.steady))
-        deflection = kept * deflection + motion.h * added * rate
-    return item.hysteresis.torque * deflection / item.hysteresis.twist
-
-
-def forgetting_rate(mech: Mechanism, item: Transmission, motion: Motion, v: ca.SX) -> Any:
-    """Return the rate at which the loop of a transmission forgets its deflection, at group speeds `v`."""
-    assert item.hysteresis is not None
-    return smooth_abs(twist_rate(mech, item, motion, v)) / item.hysteresis.twist
+    loop = mech.loops(motion.loops)[item.name]
+    if motion.steady is None:
+        return loop.torque()
+    return loop.mean_torque(rate, twist_rate(mech, item, motion, motion.steady), motion.h)
 
 
 def loop_rates(mech: Mechanism, motion: Motion) -> ca.SX:
     """Return the time derivatives of the deflections of loops."""
-    rates: list[Any] = []
-    for k, item in enumerate(mech.looping):
-        assert motion.loops is not None
-        forgotten = forgetting_rate(mech, item, motion, motion.v) * motion.loops[k]
-        rates.append(twist_rate(mech, item, motion, motion.v) - forgotten)
-    return column(rates)
+    assert motion.loops is not None
+    loops = mech.loops(motion.loops)
+    return column([one for item in mech.looping for one in loops[item.name].rates(_rate(mech, item, motion))])
 
 
 def loops_after(mech: Mechanism, motion: Motion) -> ca.SX:
     """Return the deflections of loops after a step at its mean speeds, which `motion` has."""
-    rates = ca.vertsplit(loop_rates(mech, motion))
-    after: list[Any] = []
-    for k, item in enumerate(mech.looping):
-        assert motion.loops is not None
-        kept, _ = decay_means(motion.h * forgetting_rate(mech, item, motion, motion.v))
-        after.append(motion.loops[k] + motion.h * kept * rates[k])
-    return column(after)
+    assert motion.loops is not None
+    loops, h = mech.loops(motion.loops), motion.h
+    return column([one for item in mech.looping for one in loops[item.name].after(_rate(mech, item, motion), h)])
+
+
+def _rate(mech: Mechanism, item: Transmission, motion: Motion) -> Any:
+    return twist_rate(mech, item, motion, motion.v)

@@ -18,6 +18,8 @@ from friction_ocp.parameters import Free, bind
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+Key = tuple[str, str]
+"""Name of an effect, and the component that it is at."""
 
 SHARP = 0.04
 """Damping over inertia and angular frequency of what is heard ringing."""
@@ -285,6 +287,10 @@ def transmission(drive: Drive, name: str) -> Transmission:
     return next(item for item in drive.transmissions if item.name == name)
 
 
+SHARE, SCALES = 0.5, (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Share of springs beside something that relaxes, as they are tried, and their scale over that of the latter."""
+UNEQUAL = 100.0
+"""What one spring carries over another at most."""
 RANGE = 1e3
 """Bounds of an added parameter over its first guess."""
 
@@ -297,6 +303,18 @@ def either_way(size: float) -> Free:
 def upwards(size: float) -> Free:
     """Return a parameter that is not negative."""
     return Free(size, 0.0, RANGE * size)
+
+
+def spring_shares() -> tuple[Free, Free, Free]:
+    """Return what springs beside something that relaxes carry, to be fitted."""
+    return Free(SHARE, 0.0, 1.0), Free(1.0, 0.0, UNEQUAL), Free(1.0, 0.0, UNEQUAL)
+
+
+def beside(path: str, scale: str, relaxing: float) -> tuple[dict[str, float], tuple[Trial, ...]]:
+    """Return off values and trials of springs that slip beside what relaxes over `relaxing`."""
+    equal, carried = {f"{path}.soft": 1.0, f"{path}.stiff": 1.0}, {f"{path}.share": SHARE}
+    trials = tuple(Trial((carried,), {**equal, f"{path}.{scale}": factor * relaxing}) for factor in SCALES)
+    return {f"{path}.share": 0.0}, trials
 
 
 def motor_of(drive: Drive, shaft: str) -> Motor | None:

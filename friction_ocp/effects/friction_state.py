@@ -10,9 +10,18 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_shaft, moving_shafts
+from friction_ocp.effects.effect import (
+    AbstractEffect,
+    Augmentation,
+    Clues,
+    Trial,
+    beside,
+    change_shaft,
+    moving_shafts,
+    spring_shares,
+)
 from friction_ocp.effects.friction_curve import is_dry, stribeck_speed
-from friction_ocp.friction.composite import Bristle, with_bristle
+from friction_ocp.friction.composite import Bristle, Bristled, BristleSprings, with_bristle
 from friction_ocp.friction.element import LoadDependence
 from friction_ocp.parameters import Free
 
@@ -52,6 +61,19 @@ class PreslidingEffect(AbstractEffect):
             for damping in (0.0, DAMPED * most)
         )
         return Augmentation(added, {f"{stem}.sigma0": np.inf, f"{stem}.sigma1": 0.0}, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive with springs that slip beside its bristle."""
+        shaft, stem = drive.shaft(place), f"{place}.friction.bristle"
+        law = shaft.friction.law
+        if not isinstance(law, Bristled) or law.bristle.springs is not None or not isinstance(law.bristle.sigma0, Free):
+            return None
+        stiffness = law.bristle.sigma0
+        springs = BristleSprings(*spring_shares(), stiffness)
+        law = replace(law, bristle=replace(law.bristle, springs=springs))
+        added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
+        off, trials = beside(f"{stem}.springs", "stiffness", clues.numbers.get(f"{stem}.sigma0", stiffness.guess))
+        return Augmentation(added, off, trials)
 
 
 def _breakaway(numbers: Mapping[str, float], place: str) -> float:

@@ -8,14 +8,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, SecondStage, Transmission
+from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, LoopSprings, SecondStage, Transmission
 from friction_ocp.effects.effect import (
     SHARP,
     AbstractEffect,
     Augmentation,
     Clues,
     Trial,
+    beside,
     change_transmission,
+    spring_shares,
     transmission,
     upwards,
 )
@@ -179,6 +181,16 @@ class TransmissionHysteresisEffect(AbstractEffect):
         added = change_transmission(drive, place, hysteresis=loop)
         trials = tuple(Trial(({f"{path}.torque": size},), {f"{path}.twist": one}) for one in twists)
         return Augmentation(added, {f"{path}.torque": 0.0}, trials)
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive with springs that slip beside the bristle of its loop."""
+        loop = transmission(drive, place).hysteresis
+        if loop is None or loop.springs is not None or not isinstance(loop.twist, Free):
+            return None
+        path, springs = f"{place}.hysteresis", LoopSprings(*spring_shares(), loop.twist)
+        added = change_transmission(drive, place, hysteresis=replace(loop, springs=springs))
+        off, trials = beside(f"{path}.springs", "twist", clues.numbers.get(f"{path}.twist", loop.twist.guess))
+        return Augmentation(added, off, trials)
 
 
 class KinematicErrorEffect(AbstractWaveEffect):

@@ -55,7 +55,7 @@ def gap_covariance(model: Model, item: Experiment, spans: FloatArray, shares: Fl
     cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2). What no noise enters may jump a little over a segment,
     and by as much in sum where it is cut: `shares` of a segment are the spans.
     """
-    bristle = np.array([name.endswith(".friction.z") for name in model.drive.state_names])
+    bristle = np.array([".friction.z" in name for name in model.drive.state_names])
     still = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
     part = still * np.broadcast_to(shares, spans.shape)[:, None, None]
     return torque_covariance(model.drive.mechanism, part, _group_noise(model, item), spans)

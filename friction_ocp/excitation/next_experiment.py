@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friction_ocp.diagnosis.diagnose import Diagnosis, Key
+from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.select import shown
+from friction_ocp.effects.effect import Key
 from friction_ocp.excitation.design import Design, Option, separating
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.maxwell import Spring
 from friction_ocp.friction.static import stribeck_share
 from friction_ocp.parameters import Value, quantity
 
@@ -20,6 +21,15 @@ class AbstractBristleLaw(AbstractFrictionLaw):
     @abstractmethod
     def level(self, speed: Any) -> Any:
         """Return the torque of the fully deflected bristle."""
+
+    @property
+    def carried(self) -> Any:
+        """Share of the level that the bristle carries; the springs beside it carry the rest."""
+        return 1.0
+
+    def springs(self, level: Any) -> tuple[Spring, ...]:
+        """Return the springs that slip beside the bristle, under a level."""
+        return ()
 
     def magnitude(self, speed: Any) -> Any:
         viscous: Any = getattr(self, "sigma2")  # noqa: B009

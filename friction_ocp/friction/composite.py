@@ -7,6 +7,7 @@ from typing import Any, ClassVar, TypeVar
 
 from friction_ocp.friction.bristle import AbstractBristleLaw
 from friction_ocp.friction.law import AbstractFrictionLaw
+from friction_ocp.friction.maxwell import STIFFNESSES, Spring, SpringShares
 from friction_ocp.friction.smoothing import positive_part
 from friction_ocp.friction.static import stribeck_share
 from friction_ocp.parameters import Value, inline, quantity
@@ -133,11 +134,24 @@ class BristleSum(AbstractBristleLaw):
 
 
 @dataclass(frozen=True)
+class BristleSprings(SpringShares):
+    """Springs that slip, beside a bristle; each would slip after a travel of level / stiffness."""
+
+    stiffness: Value = quantity("stiffness", "stiffness of the middle spring, did it carry all")
+
+    def under(self, level: Any) -> tuple[Spring, ...]:
+        """Return the springs under a level."""
+        wholes = [factor * self.stiffness for factor in STIFFNESSES]
+        return tuple(Spring(whole * share, level / whole) for whole, share in zip(wholes, self.shares, strict=True))
+
+
+@dataclass(frozen=True)
 class Bristle:
     """Elastic contact before breakaway."""
 
     sigma0: Value = quantity("stiffness", "bristle stiffness")
     sigma1: Value = quantity("viscous", "bristle damping", 0.0)
+    springs: BristleSprings | None = None
 
 
 @dataclass(frozen=True)
@@ -150,6 +164,17 @@ class Bristled(AbstractBristleLaw):
     law: AbstractFrictionLaw = inline()
     bristle: Bristle = Bristle(1.0)
     name: ClassVar[str] = "bristled"
+
+    @property
+    def deflections(self) -> tuple[str, ...]:
+        return ("z", *(() if self.bristle.springs is None else self.bristle.springs.deflections))
+
+    @property
+    def carried(self) -> Any:
+        return 1.0 if self.bristle.springs is None else self.bristle.springs.rest
+
+    def springs(self, level: Any) -> tuple[Spring, ...]:
+        return () if self.bristle.springs is None else self.bristle.springs.under(level)
 
     @property
     def sigma0(self) -> Any:

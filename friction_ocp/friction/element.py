@@ -7,6 +7,7 @@ the form in which the integrator solves for the new speed in closed form.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -58,6 +59,10 @@ class LoadDependence:
 
 def _stacked(items: list[Any]) -> ca.SX:
     return ca.vertcat(*[ca.SX(item) for item in items])
+
+
+Slipping = AbstractBristleLaw | AbstractMaxwellSlip
+"""Laws that may have springs that slip."""
 
 
 @dataclass(frozen=True)
@@ -136,9 +141,26 @@ class FrictionElement:
         """Return the torque of a bristle law and the rate of change of its deflection, or of its deflections."""
         if isinstance(self.law, AbstractMaxwellSlip):
             return self._maxwell_torque(omega, deflection, transmitted)
-        rate = omega - self.forgetting_rate(omega, deflection, transmitted) * deflection
-        elastic = self._sigma(0, deflection) * deflection + self._sigma(1, deflection) * rate
-        return elastic + self._viscous(omega, transmitted) * omega, rate
+        z, others = self._apart(deflection)
+        rate = omega - self.forgetting_rate(omega, z, transmitted) * z
+        elastic = self._carried(z) * (self._sigma(0, z) * z + self._sigma(1, z) * rate)
+        torque = elastic + self._viscous(omega, transmitted) * omega
+        if not others:
+            return torque, rate
+        besides, rates = self._springs_torque(omega, others, transmitted)
+        return torque + besides, _stacked([rate, *rates])
+
+    def _apart(self, deflection: Any) -> tuple[Any, list[Any]]:
+        """Return the deflection of the bristle and those of the springs beside it."""
+        count = len(self.law.deflections)
+        return (deflection, []) if count == 1 else (deflection[0], [deflection[k] for k in range(1, count)])
+
+    def _carried(self, sign_of: Any) -> Any:
+        """Return the share of the level that the bristle carries."""
+        (_, positive), (_, negative) = self._bristles()
+        if not positive.springs(1.0):
+            return 1.0
+        return where(sign_of >= 0, positive.carried, negative.carried)
 
     def _viscous(self, omega: Any, transmitted: Any) -> Any:
         viscous = self._sigma(2, omega)
@@ -171,11 +193,15 @@ class FrictionElement:
     def _bent(self, omega: Any) -> Any:
         """Return the size of steady deflections in the direction of `omega`."""
         if isinstance(self.law, AbstractMaxwellSlip):
-            plays = self._plays(omega, 0.0)
-            return _stacked([where(omega >= 0, item.forward.reach, item.backward.reach) for item in plays])
+            return _stacked(self._reaches(omega))
         (_, positive), (_, negative) = self._bristles()
         level = where(omega >= 0, positive.level(smooth_abs(omega)), negative.level(smooth_abs(omega)))
-        return level / self._sigma(0, omega)
+        own, others = level / self._sigma(0, omega), self._reaches(omega)
+        return _stacked([own, *others]) if others else own
+
+    def _reaches(self, omega: Any) -> list[Any]:
+        """Return how far springs give way, in the direction of `omega`, before they slip."""
+        return [where(omega >= 0, item.forward.reach, item.backward.reach) for item in self._plays(omega, 0.0)]
 
     def step_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
         """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""
@@ -203,25 +229,36 @@ class FrictionElement:
         return StepResponse(0.0, slope, levels[0], levels[1])
 
     def _bristle_response(self, h: Any, omega: Any, deflection: Any, transmitted: Any) -> StepResponse:
-        sigma0, sigma1 = self._sigma(0, deflection), self._sigma(1, deflection)
-        rate = self.forgetting_rate(omega, deflection, transmitted)
+        z, others = self._apart(deflection)
+        carried = self._carried(z)
+        sigma0, sigma1 = carried * self._sigma(0, z), carried * self._sigma(1, z)
+        rate = self.forgetting_rate(omega, z, transmitted)
         kept, added = decay_means(h * rate)
+        offset = (sigma0 - sigma1 * rate) * kept * z
         slope = sigma0 * h * added + sigma1 * kept + self._viscous(omega, transmitted)
-        return StepResponse((sigma0 - sigma1 * rate) * kept * deflection, slope, 0.0, 0.0)
+        if others:
+            besides = self._springs_response(h, omega, others, transmitted, lambda mean: 0.0)
+            offset, slope = offset + besides.offset, slope + besides.slope
+        return StepResponse(offset, slope, 0.0, 0.0)
 
     def advance(self, h: Any, omega: Any, mean_omega: Any, deflection: Any, transmitted: Any) -> Any:
         """Return the deflection after a step at constant speed, exact but for the level frozen at `omega`."""
         if isinstance(self.law, AbstractMaxwellSlip):
             plays = self._plays(omega, transmitted)
             return _stacked([item.after(deflection[k], h * mean_omega) for k, item in enumerate(plays)])
-        rate = self.forgetting_rate(omega, deflection, transmitted)
+        z, others = self._apart(deflection)
+        rate = self.forgetting_rate(omega, z, transmitted)
         kept, _ = decay_means(h * rate)
-        return deflection + h * kept * (mean_omega - rate * deflection)
+        own = z + h * kept * (mean_omega - rate * z)
+        if not others:
+            return own
+        plays = self._plays(omega, transmitted)
+        return _stacked([own, *(item.after(one, h * mean_omega) for item, one in zip(plays, others, strict=True))])
 
     def _plays(self, omega: Any, transmitted: Any) -> list[Play]:
-        """Return the springs of a Maxwell law between the levels of both directions at the speed `omega`."""
+        """Return the springs of a law between the levels of both directions at the speed `omega`."""
         positive, negative = self.law.along("positive"), self.law.along("negative")
-        assert isinstance(positive, AbstractMaxwellSlip) and isinstance(negative, AbstractMaxwellSlip)
+        assert isinstance(positive, Slipping) and isinstance(negative, Slipping)
         speed = smooth_abs(omega)
         loads = [self._load_level(side, speed, transmitted, with_viscous=False) for side in ("positive", "negative")]
         springs = (
@@ -242,19 +279,31 @@ class FrictionElement:
         return where(omega >= 0, torques[0], -torques[1])
 
     def _maxwell_torque(self, omega: Any, deflection: Any, transmitted: Any) -> tuple[Any, Any]:
-        plays = self._plays(omega, transmitted)
-        torque, rates = self._drag(omega, transmitted), list[Any]()
-        for k, item in enumerate(plays):
-            elastic, rate = item.torque_and_rate(omega, deflection[k])
+        deflections = [deflection[k] for k in range(len(self.law.deflections))]
+        torque, rates = self._springs_torque(omega, deflections, transmitted)
+        return self._drag(omega, transmitted) + torque, _stacked(rates)
+
+    def _springs_torque(self, omega: Any, deflections: list[Any], transmitted: Any) -> tuple[Any, list[Any]]:
+        """Return the torque of springs that slip and the rates of change of their deflections."""
+        torque: Any = 0.0
+        rates: list[Any] = []
+        for item, deflection in zip(self._plays(omega, transmitted), deflections, strict=True):
+            elastic, rate = item.torque_and_rate(omega, deflection)
             torque = torque + elastic
             rates.append(rate)
-        return torque, _stacked(rates)
+        return torque, rates
 
     def _maxwell_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
+        deflections = [deflection[k] for k in range(len(self.law.deflections))]
+        return self._springs_response(h, omega, deflections, transmitted, lambda mean: self._drag(mean, transmitted))
+
+    def _springs_response(
+        self, h: Any, omega: ca.SX, deflections: list[Any], transmitted: Any, drag: Callable[[ca.SX], Any]
+    ) -> StepResponse:
+        """Return the response of springs that slip, and of a drag."""
         mean = ca.SX.sym("mean")
-        plays = self._plays(omega, transmitted)
-        torque: Any = self._drag(mean, transmitted)
-        for k, item in enumerate(plays):
-            torque = torque + item.mean_torque(deflection[k], h * mean)
+        torque: Any = drag(mean)
+        for item, deflection in zip(self._plays(omega, transmitted), deflections, strict=True):
+            torque = torque + item.mean_torque(deflection, h * mean)
         slope = ca.substitute(ca.jacobian(torque, mean), mean, omega)
         return StepResponse(ca.substitute(torque, mean, omega) - slope * omega, slope, 0.0, 0.0)

@@ -38,8 +38,9 @@ class GeneralizedMaxwellSlip(AbstractMaxwellSlip):
     name: ClassVar[str] = "gms"
 
     @property
-    def bristle_count(self) -> int:
-        return len(self.elements)
+    def deflections(self) -> tuple[str, ...]:
+        count = len(self.elements)
+        return tuple(f"z{k + 1 if count > 1 else ''}" for k in range(count))
 
     def springs(self, level: Any) -> tuple[Spring, ...]:
         return tuple(Spring(item.stiffness, item.share * level / item.stiffness) for item in self.elements)

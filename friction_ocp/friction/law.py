@@ -71,9 +71,9 @@ class AbstractFrictionLaw(ABC):
     has_bristle: ClassVar[bool] = False
 
     @property
-    def bristle_count(self) -> int:
-        """Number of deflections that are states."""
-        return int(self.has_bristle)
+    def deflections(self) -> tuple[str, ...]:
+        """Names of the deflections that are states."""
+        return ("z",) if self.has_bristle else ()
 
     @abstractmethod
     def magnitude(self, speed: Any) -> Any:

@@ -14,6 +14,7 @@ import casadi as ca
 
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.smoothing import positive_part, smooth_abs, where
+from friction_ocp.parameters import Value, is_off, quantity
 
 ROUNDING = 1e-2
 """Share of the travel before slip over which the form in continuous time lets a spring go."""
@@ -28,6 +29,40 @@ class Spring:
 
     stiffness: Any
     reach: Any
+
+
+STIFFNESSES = (10.0**-0.5, 1.0, 10.0**0.5)
+"""Stiffness of springs beside something that relaxes, over that of the middle one, were they to carry the same."""
+
+
+@dataclass(frozen=True)
+class SpringShares:
+    """Springs that slip beside something that relaxes: what a contact of many asperities has more than one of these.
+
+    What relaxes forgets a turning point gradually; springs come back to it, and over a decade of stiffnesses, half a
+    decade apart, they follow any loop that does. Source: Iwan 1966; Al-Bender, Lampaert, Swevers 2005.
+    """
+
+    share: Value = quantity("dimensionless", "share of all that the springs carry")
+    soft: Value = quantity("dimensionless", "what the soft spring carries, over the middle one")
+    stiff: Value = quantity("dimensionless", "what the stiff spring carries, over the middle one")
+    deflections: ClassVar[tuple[str, ...]] = ("z_soft", "z_middle", "z_stiff")
+
+    @property
+    def idle(self) -> bool:
+        """Whether they plainly carry nothing."""
+        return is_off(self.share)
+
+    @property
+    def rest(self) -> Any:
+        """Share that the springs leave to what relaxes."""
+        return 1.0 - self.share
+
+    @property
+    def shares(self) -> tuple[Any, ...]:
+        """Share of each spring, the softest first."""
+        middle = self.share / (self.soft + 1.0 + self.stiff)
+        return self.soft * middle, middle, self.stiff * middle
 
 
 @dataclass(frozen=True)
@@ -84,17 +119,18 @@ class Play:
         room, size = self._room(begin, travel), smooth_abs(travel)
         slips = size > room + NO_TRAVEL * (self.forward.reach + self.backward.reach)
         stuck = where(slips, room / where(slips, size, 1.0), 1.0)
-        slipping = self._elastic(where(travel >= 0, self.forward.reach, -self.backward.reach))
+        slipping = self.elastic(where(travel >= 0, self.forward.reach, -self.backward.reach))
         return stuck * self._mean_elastic(begin, begin + self._sticking(begin, travel)) + (1.0 - stuck) * slipping
 
     def _mean_elastic(self, begin: Any, end: Any) -> Any:
         """Return the mean torque while the deflection grows evenly from `begin` to `end`."""
         crosses = begin * end < 0
         share = where(crosses, smooth_abs(begin) / where(crosses, smooth_abs(end - begin), 1.0), 0.0)
-        first, last = self._elastic(begin), self._elastic(end)
+        first, last = self.elastic(begin), self.elastic(end)
         return 0.5 * where(crosses, share * first + (1.0 - share) * last, first + last)
 
-    def _elastic(self, deflection: Any) -> Any:
+    def elastic(self, deflection: Any) -> Any:
+        """Return the torque of a deflection."""
         return where(deflection >= 0, self.forward.stiffness, self.backward.stiffness) * deflection
 
     def torque_and_rate(self, omega: Any, deflection: Any) -> tuple[Any, Any]:
@@ -105,4 +141,4 @@ class Play:
         reach = where(omega >= 0, self.forward.reach, self.backward.reach)
         used = smooth_abs(deflection) / reach
         slipping = where(omega * deflection > 0, positive_part((used - 1.0 + ROUNDING) / ROUNDING), 0.0)
-        return self._elastic(deflection), omega - slipping * omega * used
+        return self.elastic(deflection), omega - slipping * omega * used

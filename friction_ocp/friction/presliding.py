@@ -44,7 +44,7 @@ def presliding_loop(element: FrictionElement, amplitude: float, speed: float) ->
 def _torques(element: FrictionElement, h: float, omega: FloatArray) -> FloatArray:
     if not element.law.has_bristle:
         return np.asarray(element.torque(omega), dtype=np.float64)
-    z, now = ca.SX.sym("z", element.law.bristle_count), ca.SX.sym("omega")
+    z, now = ca.SX.sym("z", len(element.law.deflections)), ca.SX.sym("omega")
     after = ca.SX(element.advance(h, now, now, z, 0.0))
     torque, _ = element.bristle_torque(now, after)
     step = ca.Function("step", [z, now], [after, ca.SX(torque)])

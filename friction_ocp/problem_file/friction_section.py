@@ -10,7 +10,15 @@ from typing import Annotated, Any, ClassVar, cast, get_args, get_origin, get_typ
 from pydantic import Field, create_model
 
 from friction_ocp.expressions import closest
-from friction_ocp.friction.composite import SHARES, Bend, Bristle, StribeckRise, with_added, with_bristle
+from friction_ocp.friction.composite import (
+    SHARES,
+    Bend,
+    Bristle,
+    BristleSprings,
+    StribeckRise,
+    with_added,
+    with_bristle,
+)
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.registry import friction_laws
@@ -79,11 +87,27 @@ class AddedSection(Section):
         return terms
 
 
+class BristleSpringsSection(PartSection):
+    """Springs that slip beside a bristle."""
+
+    part: ClassVar[type[Any]] = BristleSprings
+
+    share: FrictionNumber
+    soft: FrictionNumber
+    stiff: FrictionNumber
+    stiffness: FrictionNumber
+
+
 class BristleSection(Section):
     """Elastic contact under a static law."""
 
     sigma0: FrictionNumber
     sigma1: FrictionNumber = 0.0
+    springs: BristleSpringsSection | None = None
+
+    def build(self) -> Bristle:
+        springs = None if self.springs is None else self.springs.build()
+        return Bristle(self.sigma0, self.sigma1, springs)
 
 
 class FrictionSection(Section):
@@ -118,7 +142,7 @@ class FrictionSection(Section):
             whole = with_added(whole, **self.added.build())
             self._refuse_shares_of_nothing(law)
         if self.bristle is not None and not law.has_bristle:
-            whole = with_bristle(whole, Bristle(self.bristle.sigma0, self.bristle.sigma1))
+            whole = with_bristle(whole, self.bristle.build())
         load = None if self.load is None else self.load.build()
         return FrictionElement(whole, load, self.ripple, self.warm_up)
 

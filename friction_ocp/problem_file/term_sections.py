@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, cast, get_args, get_type_hints
 
 from pydantic import PlainValidator, create_model
 
@@ -37,11 +37,21 @@ def _reader(term: type[Any]) -> Callable[[Any], Any]:
     return read
 
 
+def _kind(field: dataclasses.Field[Any], hint: Any) -> Any:
+    """Return what a key holds: a number, or the fields of a part."""
+    if "kind" in field.metadata:
+        return Number
+    part = next(one for one in get_args(hint) if dataclasses.is_dataclass(one))
+    return Annotated[Any, PlainValidator(_reader(cast(type[Any], part)))]
+
+
 @lru_cache(maxsize=64)
 def _section_of(term: type[Any]) -> type[Section]:
     fields = dataclasses.fields(term)
+    hints = get_type_hints(term)
     keys: dict[str, Any] = {
-        field.name: (Number, ... if field.default is dataclasses.MISSING else field.default) for field in fields
+        field.name: (_kind(field, hints[field.name]), ... if field.default is dataclasses.MISSING else field.default)
+        for field in fields
     }
     return create_model(term.__name__, __base__=Section, **keys)
 

@@ -109,7 +109,7 @@ def joint_drive(fitted: Fitted, elastic: bool = True) -> JointDrive:
     top = {name: item.top for name, item in fitted.model.speeds.items()}
     joints = tuple(_joint(drive, structure, group, top, losses) for group in range(len(structure.roots)))
     springs = tuple(_spring(item, structure, joints) for item in structure.elastic)
-    signals = {motor.name: mech.driving_signal(motor) for motor in drive.motors}
+    signals = {motor.name: mech.drive.driving_signal(motor) for motor in drive.motors}
     actuators = tuple(
         _actuator(motor, str(signals[motor.name]), structure, joints, losses)
         for motor in drive.motors

@@ -152,7 +152,7 @@ def _functions(mech: Mechanism) -> _Functions:
     state = state_symbols(mech)
     at = state.motion(mech)
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
-    driven = [motor for motor in mech.drive.motors if mech.driving_signal(motor)]
+    driven = [motor for motor in mech.drive.motors if mech.drive.driving_signal(motor)]
     enables = [mech.true_input(f"{motor.name}.enable") for motor in driven]
     commands = column([motor_command(mech, motor, at) for motor in driven])
     torques = column([motor_torque(mech, motor, at) for motor in driven])

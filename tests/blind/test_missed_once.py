@@ -20,6 +20,11 @@ MISSED: dict[str, tuple[int, int, Found]] = {
         *(20261207, 138),
         [("load_dependence", "motor")],
     ),
+    "presliding of springs that slip one after another, of which a single bristle leaves five times the noise": (
+        *(20261207, 119),
+        [("presliding", "motor")],
+    ),
+    "a transmission whose loop is one of springs that slip": (20261207, 46, [("transmission_hysteresis", "gear-axis")]),
     "the back-EMF of a motor that saturates falls with its torque": (20261207, 158, [("torque_saturation", "motor")]),
 }
 

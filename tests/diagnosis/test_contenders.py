@@ -11,8 +11,7 @@ from friction_ocp.diagnosis.contenders import completed_rivals, to_refit
 from friction_ocp.diagnosis.crew import Crew, Refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened
-from friction_ocp.diagnosis.worth import Key
-from friction_ocp.effects.effect import Augmentation
+from friction_ocp.effects.effect import Augmentation, Key
 
 SAMPLES, COST = 1000, 3000.0
 """The noise of the samples makes 500 of the cost."""

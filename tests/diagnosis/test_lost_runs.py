@@ -21,8 +21,7 @@ from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.polishing import loosely
 from friction_ocp.diagnosis.refit import NUDGES, best_nudged, completed, nudged, quick_refit
 from friction_ocp.diagnosis.screen import Screened, Start
-from friction_ocp.diagnosis.worth import Key
-from friction_ocp.effects.effect import Augmentation, Trial
+from friction_ocp.effects.effect import Augmentation, Key, Trial
 from friction_ocp.estimation.model import Model
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem

@@ -11,17 +11,18 @@ from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, wr
 from plant import PlantFriction, PlantRipple
 
 from friction_ocp.diagnosis import reexamine
-from friction_ocp.diagnosis.bench import Bench, blocks_like, open_bench
+from friction_ocp.diagnosis.bench import Bench, open_bench
+from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.held_out import folds, held_out
+from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.reexamine import exchanged
 from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import screen
 from friction_ocp.diagnosis.select import Round, choose
-from friction_ocp.diagnosis.worth import Key
 from friction_ocp.drive.parts import Gravity
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import fits_free_run, horizon, judged_alike
 from friction_ocp.estimation.model import prepare, with_drive
@@ -39,10 +40,7 @@ def rival(bench: Bench, key: Key) -> Rival:
     found = screen(bench.current, effects()[key[0]], key[1], bench.clues)
     assert found is not None
     fitted = completed(quick_refit(bench.current, found))
-    gains = bench.current.blocks.sums(held_out(bench.current)) - blocks_like(
-        bench.current, fitted, bench.current.blocks
-    )
-    return Rival.of(found, fitted, gains)
+    return Rival.of(found, fitted, -Benchmark(bench.current).dearer(fitted))
 
 
 def round_of(bench: Bench, keys: list[Key]) -> Round:

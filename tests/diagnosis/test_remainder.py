@@ -11,7 +11,7 @@ import pytest
 from friction_ocp.diagnosis import reexamine
 from friction_ocp.diagnosis.bench import Bench
 from friction_ocp.diagnosis.reexamine import without_small
-from friction_ocp.diagnosis.worth import Key
+from friction_ocp.effects.effect import Key
 
 SAMPLES = 1000
 NOISE = 0.5 * SAMPLES

@@ -19,6 +19,7 @@ from friction_ocp.drive.parts import (
     Cogging,
     Disturbance,
     Drive,
+    Hysteresis,
     KinematicError,
     Motor,
     Shaft,
@@ -29,7 +30,7 @@ from friction_ocp.drive.stepping import stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.effects.registry import effects
-from friction_ocp.friction.composite import AddedFriction, StribeckRise, Sum
+from friction_ocp.friction.composite import AddedFriction, Bristle, StribeckRise, Sum, with_bristle
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.static import CoulombViscous
@@ -40,9 +41,15 @@ LAW = CoulombViscous(0.1, 0.02)
 RISING = Sum(LAW, AddedFriction(stribeck=StribeckRise(0.1, 3.0, 2.0)))
 
 
-def geared(law: FrictionElement = FrictionElement(LAW), wave: Disturbance | None = None, **motor: Any) -> Drive:
+def geared(
+    law: FrictionElement = FrictionElement(LAW),
+    wave: Disturbance | None = None,
+    loop: Hysteresis | None = None,
+    **motor: Any,
+) -> Drive:
     """Return a motor and a load on an elastic gear whose ratio ripples."""
-    gear = Transmission("motor", "load", 5.0, 800.0, 2.0, kinematic_error=KinematicError(0.01, 0.02, 0.9))
+    ripple = KinematicError(0.01, 0.02, 0.9)
+    gear = Transmission("motor", "load", 5.0, 800.0, 2.0, hysteresis=loop, kinematic_error=ripple)
     channels = (Channel("torque", "drive.torque", "input"), Channel("theta", "motor.theta"))
     shafts = (Shaft("motor", 0.02, law, disturbance=wave), Shaft("load", 0.5))
     return Drive(shafts, (gear,), (Motor("drive", "motor", **motor),), None, channels)
@@ -56,8 +63,11 @@ SHAPES: dict[str, tuple[Drive, str]] = {
     "periodic_disturbance": (geared(wave=Disturbance(0.1, 0.05, 0.3)), "motor"),
     "kinematic_error": (geared(), "motor-load"),
     "torque_saturation": (geared(saturation=0.5), "motor"),
+    "presliding": (geared(FrictionElement(with_bristle(LAW, Bristle(Free(500.0), 0.2)))), "motor"),
+    "transmission_hysteresis": (geared(loop=Hysteresis(0.4, Free(2e-3))), "motor-load"),
 }
 """A drive that has the effect already, and where."""
+MOVING, DEFLECTION = {"motor.theta": 1.3, "load.theta": 0.2, "motor.omega": 2.0, "load.omega": 0.5}, 1e-3
 COSINES, SINES = (0.03, 0.0, 0.006), (0.0, -0.012, 0.0)
 
 
@@ -125,10 +135,11 @@ def test_a_shape_begins_as_what_it_was(name: str) -> None:
     further = effect.reshaped(found.drive, place, clues)
     assert further is None or effect.reshaped(further.drive, place, clues) is None
     assert set(found.off) == {path for trial in found.trials for grown in trial.amplitudes for path in grown}
-    plain, off = moved(drive, {}), moved(found.drive, found.off)
-    assert off == pytest.approx(plain, rel=1e-12)
     sizes = [1.0] * len(found.trials[0].amplitudes)
-    assert moved(found.drive, found.trials[0].values(found.off, sizes)) != pytest.approx(plain, rel=1e-9)
+    plain = moved(drive, {})
+    off, on = (moved(found.drive, at) for at in (found.off, found.trials[0].values(found.off, sizes)))
+    assert {state: off[state] for state in plain} == pytest.approx(plain, rel=1e-12)
+    assert {state: on[state] for state in plain} != pytest.approx(plain, rel=1e-9)
 
 
 @pytest.mark.parametrize(("period", "also"), [(0.35, "second_cosine"), (0.7, "second_cosine"), (0.43, "other_cosine")])
@@ -162,15 +173,15 @@ def test_other_effects_keep_their_shape() -> None:
     assert added.shaft("motor").external_torque is not None
 
 
-def moved(drive: Drive, values: Mapping[str, float]) -> list[float]:
-    """Return the state a step after some state in motion."""
+def moved(drive: Drive, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the state, by name, a step after some state in motion."""
     made = stepped(drive)
     numbers = {leaf.path: start_of(leaf.value) for leaf in drive_leaves(drive)} | dict(values)
-    at = [1.3, 0.2, 2.0, 0.5][: len(made.state_names)]
+    at = [MOVING.get(name, DEFLECTION) for name in made.state_names]
     after = made.step(
         at, [0.4, 0.13, 0.13][: len(made.input_names)], [numbers[name] for name in made.parameter_names], 1e-3, 0
     )
-    return [float(item) for item in np.ravel(np.asarray(after))]
+    return dict(zip(made.state_names, map(float, np.ravel(np.asarray(after))), strict=True))
 
 
 @pytest.mark.slow
@@ -214,6 +225,15 @@ def test_the_sharpness_of_saturation_is_found(tmp_path: Path) -> None:
     found = values_of(diagnosed(tmp_path, plant, ["torque_saturation", "quadratic_drag"]))
     assert found["saturation"] == pytest.approx(limit**-2.0, rel=0.05)
     assert found["saturation_sharpness"] == pytest.approx(sharpness, rel=0.1)
+
+
+@pytest.mark.slow
+def test_presliding_of_springs_is_presliding(tmp_path: Path) -> None:
+    """Springs that slip one after another leave more beside one bristle than noise, and nothing beside springs."""
+    elements = ((1.0, 0.2), (0.3, 0.5), (0.1, 0.3))
+    plant = axis(law="gms", elements=elements)
+    found = values_of(diagnosed(tmp_path, plant, ["presliding", "stribeck", "position_ripple"]))
+    assert found["share"] > 0.5
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from friction_ocp.diagnosis import reexamine, search, stand_ins
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Choice, Round
-from friction_ocp.diagnosis.worth import Key
+from friction_ocp.effects.effect import Key
 
 HELD, RIVAL, PLACE = ("asymmetry", "motor"), ("constant_torque", "motor"), ("asymmetry", "load")
 

@@ -24,6 +24,7 @@ from friction_ocp.drive.parts import (
     Eccentricity,
     Hysteresis,
     KinematicError,
+    LoopSprings,
     Motor,
     SecondStage,
     Shaft,
@@ -34,6 +35,7 @@ from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.friction.bristle import LuGre
+from friction_ocp.friction.composite import Bristle, BristleSprings, with_bristle
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.friction.static import Coulomb, CoulombViscous, Polyline, Stribeck, Viscous
@@ -396,12 +398,18 @@ ZERO_TERMS: dict[str, Callable[[Any], Drive]] = {
     "axis-load.stiffening": lambda off: pair(replace(SPRING, stiffening=off)),
     "axis-load.second_stage": lambda off: pair(replace(SPRING, second_stage=SecondStage(off, 0.02))),
     "axis-load.hysteresis": lambda off: pair(replace(SPRING, hysteresis=Hysteresis(off, LOOP_TWIST))),
+    "axis-load.hysteresis.springs": lambda off: pair(
+        replace(SPRING, hysteresis=Hysteresis(0.3, LOOP_TWIST, LoopSprings(off, 0.7, 1.2, LOOP_TWIST)))
+    ),
+    "axis.friction.bristle.springs": lambda off: axis(
+        FrictionElement(with_bristle(LAW, Bristle(50.0, 0.1, BristleSprings(off, 0.7, 1.2, 20.0))))
+    ),
     "axis-load.kinematic_error": lambda off: pair(replace(SPRING, kinematic_error=KinematicError(off, off, 0.9))),
     "theta.eccentricity": lambda off: sensed(Eccentricity(off, off)),
 }
 AMPLITUDE = (
     *("cosine", "sine", "per_kelvin", "amplitude", "loss_share", "lag", "saturation"),
-    *("stiffening", "hysteresis.torque", "second_stage.stiffness"),
+    *("stiffening", "hysteresis.torque", "second_stage.stiffness", "springs.share"),
 )
 
 
@@ -413,6 +421,8 @@ def sensed(eccentricity: Eccentricity | None) -> Drive:
 
 
 ABSENT = {
+    "axis-load.hysteresis.springs": pair(replace(SPRING, hysteresis=Hysteresis(0.3, LOOP_TWIST))),
+    "axis.friction.bristle.springs": axis(FrictionElement(with_bristle(LAW, Bristle(50.0, 0.1)))),
     "theta": sensed(None),
     "axis-load": pair(SPRING),
     "axis.friction.warm_up.loss_share": axis(FrictionElement(LAW, warm_up=WarmUp(0.0, 0.3, 0.2))),

@@ -57,6 +57,9 @@ PLANTS: dict[str, Plant] = {
     "stiffening": pair(joint=replace(JOINT, cubic=3e5)),
     "second stage": pair(joint=replace(JOINT, second_stage=(900.0, 0.003))),
     "hysteresis": pair(joint=replace(JOINT, loop=PlantLoop(((1.0, 0.003),), smooth=True))),
+    "hysteresis of springs": pair(
+        joint=replace(JOINT, loop=PlantLoop(((0.3, 0.003 * 10.0**0.5), (0.5, 0.003), (0.2, 0.003 / 10.0**0.5))))
+    ),
     "kinematic error": pair(joint=replace(JOINT, kinematic_error=PlantRipple(0.7, 0.003, 0.004))),
     "backlash and all of these": pair(
         joint=replace(

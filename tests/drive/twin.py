@@ -12,6 +12,7 @@ from plant import (
     Plant,
     PlantController,
     PlantFriction,
+    PlantLoop,
     PlantMotor,
     PlantRipple,
     PlantSensor,
@@ -33,6 +34,7 @@ from friction_ocp.drive.parts import (
     Gravity,
     Hysteresis,
     KinematicError,
+    LoopSprings,
     Motor,
     SecondStage,
     Shaft,
@@ -43,6 +45,7 @@ from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.friction.element import FrictionElement, LoadDependence
 from friction_ocp.friction.gms import MaxwellElement
+from friction_ocp.friction.maxwell import STIFFNESSES
 from friction_ocp.friction.modifiers import Ripple, WarmUp
 from friction_ocp.friction.registry import friction_laws
 from friction_ocp.friction.static import Polyline
@@ -124,9 +127,19 @@ def _shaft(shaft: PlantShaft) -> Shaft:
     )
 
 
+def _loop(loop: PlantLoop) -> Hysteresis:
+    """Return the loop of a smooth element, or of three sharp ones half a decade apart, the softest first."""
+    if loop.smooth:
+        return Hysteresis(*loop.elements[0])
+    torques, twists = np.array(loop.elements).T
+    assert np.allclose(twists, twists[1] / np.array(STIFFNESSES))
+    soft, middle, stiff = map(float, torques)
+    springs = LoopSprings(1.0, soft / middle, stiff / middle, float(twists[1]))
+    return Hysteresis(float(np.sum(torques)), float(twists[1]), springs)
+
+
 def _transmission(item: PlantTransmission) -> Transmission:
     loop, stiffness = item.loop, item.stiffness if np.isfinite(item.stiffness) else None
-    assert loop is None or (loop.smooth and len(loop.elements) == 1)
     return Transmission(
         item.from_shaft,
         item.to_shaft,
@@ -136,7 +149,7 @@ def _transmission(item: PlantTransmission) -> Transmission:
         item.backlash,
         item.cubic,
         SecondStage(*item.second_stage, 0.0) if any(item.second_stage) else None,
-        None if loop is None else Hysteresis(*loop.elements[0]),
+        None if loop is None else _loop(loop),
         _wave(KinematicError, item.kinematic_error),
     )
 

@@ -19,6 +19,8 @@ from friction_ocp.problem_file.load import load_problem
 
 HEAD = "Asked: a question.\n\n  Known: an indented line."
 
+PARTS = ("share", "soft", "stiff")
+
 
 def values_of(problem: Problem) -> dict[str, Any]:
     return {leaf.path: leaf.value for leaf in drive_leaves(problem.drive)}
@@ -76,6 +78,7 @@ def test_every_fitted_number_is_found(workshop: Workshop) -> None:
                         "tau_c": {"positive": one, "negative": one},
                         "slopes": {"positive": [one, one], "negative": [one, one]},
                         "breaks": [one],
+                        "bristle": {"sigma0": one, "springs": dict.fromkeys((*PARTS, "stiffness"), one)},
                     },
                 },
                 {"name": "arm", "inertia": one, "gravity": {"torque": one}},
@@ -91,7 +94,14 @@ def test_every_fitted_number_is_found(workshop: Workshop) -> None:
                     },
                 },
             ],
-            "transmissions": [{"stiffness": one, "damping": one}, {"stiffness": "rigid"}],
+            "transmissions": [
+                {
+                    "stiffness": one,
+                    "damping": one,
+                    "hysteresis": {"torque": one, "twist": one, "springs": dict.fromkeys((*PARTS, "twist"), one)},
+                },
+                {"stiffness": "rigid"},
+            ],
         }
         content["channels"]["position"] |= {"gain": one, "offset": one, "delay": one}
 
@@ -99,7 +109,7 @@ def test_every_fitted_number_is_found(workshop: Workshop) -> None:
     free = [path for path, value in values_of(load_problem(source)).items() if isinstance(value, Free)]
     fitted = {path: 1.0 + 0.01 * k for k, path in enumerate(free)}
     after = values_of(reread(source, fitted, workshop.folder))
-    assert len(free) == 21
+    assert len(free) == 32
     assert {path: after[path].guess for path in free} == fitted
 
 
