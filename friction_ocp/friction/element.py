@@ -7,7 +7,6 @@ the form in which the integrator solves for the new speed in closed form.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -139,28 +138,31 @@ class FrictionElement:
 
     def bristle_torque(self, omega: Any, deflection: Any, transmitted: Any = 0.0) -> tuple[Any, Any]:
         """Return the torque of a bristle law and the rate of change of its deflection, or of its deflections."""
-        if isinstance(self.law, AbstractMaxwellSlip):
-            return self._maxwell_torque(omega, deflection, transmitted)
-        z, others = self._apart(deflection)
-        rate = omega - self.forgetting_rate(omega, z, transmitted) * z
-        elastic = self._carried(z) * (self._sigma(0, z) * z + self._sigma(1, z) * rate)
-        torque = elastic + self._viscous(omega, transmitted) * omega
-        if not others:
-            return torque, rate
-        besides, rates = self._springs_torque(omega, others, transmitted)
-        return torque + besides, _stacked([rate, *rates])
+        (z, others), rates = self._apart(deflection), list[Any]()
+        torque = self._drag(omega, transmitted)
+        if z is not None:
+            sigma0, sigma1 = self._carried(z)
+            rates.append(omega - self.forgetting_rate(omega, z, transmitted) * z)
+            torque = torque + sigma0 * z + sigma1 * rates[0]
+        for item, one in zip(self._plays(omega, transmitted), others, strict=True):
+            elastic, rate = item.torque_and_rate(omega, one)
+            torque = torque + elastic
+            rates.append(rate)
+        return torque, _stacked(rates)
 
     def _apart(self, deflection: Any) -> tuple[Any, list[Any]]:
-        """Return the deflection of the bristle and those of the springs beside it."""
-        count = len(self.law.deflections)
-        return (deflection, []) if count == 1 else (deflection[0], [deflection[k] for k in range(1, count)])
+        """Return the deflection of the bristle, None where there is none, and those of springs that slip."""
+        each = ca.vertsplit(ca.SX(deflection))
+        return (None, each) if isinstance(self.law, AbstractMaxwellSlip) else (each[0], each[1:])
 
-    def _carried(self, sign_of: Any) -> Any:
-        """Return the share of the level that the bristle carries."""
+    def _carried(self, sign_of: Any) -> tuple[Any, Any]:
+        """Return stiffness and damping of the bristle by the share of the level that it carries."""
+        sigma0, sigma1 = self._sigma(0, sign_of), self._sigma(1, sign_of)
+        if len(self.law.deflections) == 1:
+            return sigma0, sigma1
         (_, positive), (_, negative) = self._bristles()
-        if not positive.springs(1.0):
-            return 1.0
-        return where(sign_of >= 0, positive.carried, negative.carried)
+        share = where(sign_of >= 0, positive.carried, negative.carried)
+        return share * sigma0, share * sigma1
 
     def _viscous(self, omega: Any, transmitted: Any) -> Any:
         viscous = self._sigma(2, omega)
@@ -192,25 +194,19 @@ class FrictionElement:
 
     def _bent(self, omega: Any) -> Any:
         """Return the size of steady deflections in the direction of `omega`."""
+        reaches = [where(omega >= 0, item.forward.reach, item.backward.reach) for item in self._plays(omega, 0.0)]
         if isinstance(self.law, AbstractMaxwellSlip):
-            return _stacked(self._reaches(omega))
+            return _stacked(reaches)
         (_, positive), (_, negative) = self._bristles()
         level = where(omega >= 0, positive.level(smooth_abs(omega)), negative.level(smooth_abs(omega)))
-        own, others = level / self._sigma(0, omega), self._reaches(omega)
-        return _stacked([own, *others]) if others else own
-
-    def _reaches(self, omega: Any) -> list[Any]:
-        """Return how far springs give way, in the direction of `omega`, before they slip."""
-        return [where(omega >= 0, item.forward.reach, item.backward.reach) for item in self._plays(omega, 0.0)]
+        return _stacked([level / self._sigma(0, omega), *reaches])
 
     def step_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
         """Return the response over a step of `h` s that begins at speed `omega` (an SX symbol)."""
         if isinstance(self.law, NoFriction):
             return StepResponse(0.0, 0.0, 0.0, 0.0)
-        if isinstance(self.law, AbstractMaxwellSlip):
-            return self._maxwell_response(h, omega, deflection, transmitted)
         if self.law.has_bristle:
-            return self._bristle_response(h, omega, deflection, transmitted)
+            return self._deflected_response(h, omega, deflection, transmitted)
         return self._static_response(omega, transmitted)
 
     def _static_response(self, omega: ca.SX, transmitted: Any) -> StepResponse:
@@ -228,32 +224,34 @@ class FrictionElement:
         slope = where(omega >= 0, slopes[0], slopes[1])
         return StepResponse(0.0, slope, levels[0], levels[1])
 
-    def _bristle_response(self, h: Any, omega: Any, deflection: Any, transmitted: Any) -> StepResponse:
+    def _deflected_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
+        """Return the response of a bristle and of springs that slip; theirs is linearised at the speed `omega`."""
         z, others = self._apart(deflection)
-        carried = self._carried(z)
-        sigma0, sigma1 = carried * self._sigma(0, z), carried * self._sigma(1, z)
-        rate = self.forgetting_rate(omega, z, transmitted)
-        kept, added = decay_means(h * rate)
-        offset = (sigma0 - sigma1 * rate) * kept * z
-        slope = sigma0 * h * added + sigma1 * kept + self._viscous(omega, transmitted)
-        if others:
-            besides = self._springs_response(h, omega, others, transmitted, lambda mean: 0.0)
-            offset, slope = offset + besides.offset, slope + besides.slope
+        mean, torque = ca.SX.sym("mean"), ca.SX(0.0)
+        for item, one in zip(self._plays(omega, transmitted), others, strict=True):
+            torque = torque + item.mean_torque(one, h * mean)
+        if z is None:
+            torque = torque + self._drag(mean, transmitted)
+        slope = ca.substitute(ca.jacobian(torque, mean), mean, omega)
+        offset = ca.substitute(torque, mean, omega) - slope * omega
+        if z is not None:
+            sigma0, sigma1 = self._carried(z)
+            rate = self.forgetting_rate(omega, z, transmitted)
+            kept, added = decay_means(h * rate)
+            offset = offset + (sigma0 - sigma1 * rate) * kept * z
+            slope = slope + sigma0 * h * added + sigma1 * kept + self._viscous(omega, transmitted)
         return StepResponse(offset, slope, 0.0, 0.0)
 
     def advance(self, h: Any, omega: Any, mean_omega: Any, deflection: Any, transmitted: Any) -> Any:
         """Return the deflection after a step at constant speed, exact but for the level frozen at `omega`."""
-        if isinstance(self.law, AbstractMaxwellSlip):
-            plays = self._plays(omega, transmitted)
-            return _stacked([item.after(deflection[k], h * mean_omega) for k, item in enumerate(plays)])
         z, others = self._apart(deflection)
+        plays = zip(self._plays(omega, transmitted), others, strict=True)
+        slipped = [item.after(one, h * mean_omega) for item, one in plays]
+        if z is None:
+            return _stacked(slipped)
         rate = self.forgetting_rate(omega, z, transmitted)
         kept, _ = decay_means(h * rate)
-        own = z + h * kept * (mean_omega - rate * z)
-        if not others:
-            return own
-        plays = self._plays(omega, transmitted)
-        return _stacked([own, *(item.after(one, h * mean_omega) for item, one in zip(plays, others, strict=True))])
+        return _stacked([z + h * kept * (mean_omega - rate * z), *slipped])
 
     def _plays(self, omega: Any, transmitted: Any) -> list[Play]:
         """Return the springs of a law between the levels of both directions at the speed `omega`."""
@@ -268,7 +266,9 @@ class FrictionElement:
         return [Play(*pair) for pair in zip(*springs, strict=True)]
 
     def _drag(self, omega: Any, transmitted: Any) -> Any:
-        """Return the signed part of a Maxwell law's torque that depends on the speed alone."""
+        """Return the signed part of the torque that depends on the speed alone."""
+        if isinstance(self.law, AbstractBristleLaw):
+            return self._viscous(omega, transmitted) * omega
         torques: list[Any] = []
         for side in ("positive", "negative"):
             law = self.law.along(side)
@@ -277,33 +277,3 @@ class FrictionElement:
             size = smooth_abs(omega)
             torques.append(law.drag(size) + viscous * size)
         return where(omega >= 0, torques[0], -torques[1])
-
-    def _maxwell_torque(self, omega: Any, deflection: Any, transmitted: Any) -> tuple[Any, Any]:
-        deflections = [deflection[k] for k in range(len(self.law.deflections))]
-        torque, rates = self._springs_torque(omega, deflections, transmitted)
-        return self._drag(omega, transmitted) + torque, _stacked(rates)
-
-    def _springs_torque(self, omega: Any, deflections: list[Any], transmitted: Any) -> tuple[Any, list[Any]]:
-        """Return the torque of springs that slip and the rates of change of their deflections."""
-        torque: Any = 0.0
-        rates: list[Any] = []
-        for item, deflection in zip(self._plays(omega, transmitted), deflections, strict=True):
-            elastic, rate = item.torque_and_rate(omega, deflection)
-            torque = torque + elastic
-            rates.append(rate)
-        return torque, rates
-
-    def _maxwell_response(self, h: Any, omega: ca.SX, deflection: Any, transmitted: Any) -> StepResponse:
-        deflections = [deflection[k] for k in range(len(self.law.deflections))]
-        return self._springs_response(h, omega, deflections, transmitted, lambda mean: self._drag(mean, transmitted))
-
-    def _springs_response(
-        self, h: Any, omega: ca.SX, deflections: list[Any], transmitted: Any, drag: Callable[[ca.SX], Any]
-    ) -> StepResponse:
-        """Return the response of springs that slip, and of a drag."""
-        mean = ca.SX.sym("mean")
-        torque: Any = drag(mean)
-        for item, deflection in zip(self._plays(omega, transmitted), deflections, strict=True):
-            torque = torque + item.mean_torque(deflection, h * mean)
-        slope = ca.substitute(ca.jacobian(torque, mean), mean, omega)
-        return StepResponse(ca.substitute(torque, mean, omega) - slope * omega, slope, 0.0, 0.0)
