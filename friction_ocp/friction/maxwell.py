@@ -19,6 +19,9 @@ from friction_ocp.parameters import Value, is_off, quantity
 ROUNDING = 1e-2
 """Share of the travel before slip over which the form in continuous time lets a spring go."""
 
+DEPTH = 10
+"""Operations over which two expressions are compared."""
+
 NO_TRAVEL = 1e-12
 """Share of the reach below which slip does not show; it keeps derivatives finite."""
 
@@ -95,6 +98,12 @@ class Play:
     forward: Spring
     backward: Spring
 
+    @property
+    def _even(self) -> bool:
+        """Whether it is as stiff one way as the other, for all that expressions tell."""
+        one, other = ca.SX(self.forward.stiffness), ca.SX(self.backward.stiffness)
+        return bool(ca.is_equal(one, other, DEPTH))
+
     def held(self, deflection: Any) -> Any:
         """Return the part of a deflection that the level can hold."""
         return ca.fmin(ca.fmax(ca.SX(deflection), -self.backward.reach), self.forward.reach)
@@ -124,6 +133,8 @@ class Play:
 
     def _mean_elastic(self, begin: Any, end: Any) -> Any:
         """Return the mean torque while the deflection grows evenly from `begin` to `end`."""
+        if self._even:
+            return self.forward.stiffness * (0.5 * (begin + end))
         crosses = begin * end < 0
         share = where(crosses, smooth_abs(begin) / where(crosses, smooth_abs(end - begin), 1.0), 0.0)
         first, last = self.elastic(begin), self.elastic(end)
@@ -131,6 +142,8 @@ class Play:
 
     def elastic(self, deflection: Any) -> Any:
         """Return the torque of a deflection."""
+        if self._even:
+            return self.forward.stiffness * deflection
         return where(deflection >= 0, self.forward.stiffness, self.backward.stiffness) * deflection
 
     def torque_and_rate(self, omega: Any, deflection: Any) -> tuple[Any, Any]:
