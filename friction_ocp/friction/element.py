@@ -56,8 +56,9 @@ class LoadDependence:
         return self.coulomb + self.stribeck * falling
 
 
-def _stacked(items: list[Any]) -> ca.SX:
-    return ca.vertcat(*[ca.SX(item) for item in items])
+def _stacked(items: list[Any]) -> Any:
+    """Return several deflections, or what belongs to them, as a column; one as it is."""
+    return items[0] if len(items) == 1 else ca.vertcat(*[ca.SX(item) for item in items])
 
 
 Slipping = AbstractBristleLaw | AbstractMaxwellSlip
@@ -152,7 +153,8 @@ class FrictionElement:
 
     def _apart(self, deflection: Any) -> tuple[Any, list[Any]]:
         """Return the deflection of the bristle, None where there is none, and those of springs that slip."""
-        each = ca.vertsplit(ca.SX(deflection))
+        count = len(self.law.deflections)
+        each = [deflection] if count == 1 else [deflection[k] for k in range(count)]
         return (None, each) if isinstance(self.law, AbstractMaxwellSlip) else (each[0], each[1:])
 
     def _carried(self, sign_of: Any) -> tuple[Any, Any]:
