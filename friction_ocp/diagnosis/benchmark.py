@@ -11,6 +11,7 @@ from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
+from friction_ocp.diagnosis.rival import Standing
 from friction_ocp.diagnosis.select import resamples, schwarz
 from friction_ocp.simulation.grid import FloatArray
 
@@ -34,7 +35,7 @@ class Benchmark:
         """Return (blocks,) what another model costs more than this one."""
         return blocks_like(self.fitted, other) - self._costs
 
-    def simpler(self, other: FittedModel) -> bool:
+    def simpler(self, other: FittedModel | Standing) -> bool:
         """Whether another model has fewer parameters and costs no more than they are worth (Schwarz 1978)."""
         fewer = self.fitted.determined - other.determined
         return fewer > 0 and other.cost - self.fitted.cost < schwarz(self.blocks) * fewer

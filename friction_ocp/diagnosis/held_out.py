@@ -27,7 +27,11 @@ UNTOLD = 1e-8
 BROKEN = 1e6
 """Least cost of a row where the simulation of a recording left out has broken down: an error of 1400 floors."""
 SHRINK = 0.01
-"""Share of the information of a left-out recording that is kept: where nothing else informs, parameters stay near."""
+"""Share of the information of a left-out recording that is kept: where nothing else informs, parameters stay near.
+
+Of a recording that the model is far from, that is the share of what it can inform of: its errors are no noise, and as a
+likelihood reads them they tell as much less as their power is larger.
+"""
 
 
 def held_out(fitted: FittedModel) -> FloatArray:
@@ -62,17 +66,28 @@ def _held_out_points(fitted: FittedModel, index: int) -> FloatArray:
     for part in range(MOST_FOLDS):
         at = np.arange(own.size) % MOST_FOLDS == part
         left = np.isin(np.arange(rows.residual.size), own[at])
-        step = _step_without(fitted, left)[0] if fitted.theta.size else np.zeros(0)
+        step = _step_without(fitted, left, _kept(fitted, left))[0] if fitted.theta.size else np.zeros(0)
         errors, _ = term.residuals(fitted.model.space, fitted.theta + step)
         costs[at] = 0.5 * errors[at] ** 2
     return costs
 
 
-def _step_without(fitted: FittedModel, left: BoolArray) -> tuple[FloatArray, float]:
-    """Return the step of the parameters that leaves some rows out, and what it is predicted to gain on the others."""
-    rows, kept = fitted.linear.rows, ~left
-    information = rows.jacobian[kept].T @ rows.jacobian[kept] + SHRINK * rows.jacobian[left].T @ rows.jacobian[left]
-    pull = rows.jacobian[kept].T @ rows.residual[kept]
+def _kept(fitted: FittedModel, left: BoolArray) -> FloatArray:
+    """Return (parameters, parameters) information that is kept of rows that are left out."""
+    rows = fitted.linear.rows
+    jacobian, residual = rows.jacobian[left], rows.residual[left]
+    power = float(np.mean(residual[residual != 0.0] ** 2)) if np.any(residual) else 1.0
+    return SHRINK / max(power, 1.0) * jacobian.T @ jacobian
+
+
+def _step_without(fitted: FittedModel, left: BoolArray, kept: FloatArray) -> tuple[FloatArray, float]:
+    """Return the step of the parameters that leaves some rows out, and what it is predicted to gain on the others.
+
+    `kept` is the information that is kept of those rows.
+    """
+    rows, others = fitted.linear.rows, ~left
+    information = rows.jacobian[others].T @ rows.jacobian[others] + kept
+    pull = rows.jacobian[others].T @ rows.residual[others]
     information[np.diag_indices_from(information)] *= 1.0 + UNTOLD
     space, none = fitted.model.space, (np.zeros((0, pull.size)), np.zeros(0))
     step = bounded_step(information, pull, space.lower - fitted.theta, space.upper - fitted.theta, *none)
@@ -86,8 +101,8 @@ def fitted_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
     if not others or not fitted.theta.size:
         return fitted.theta
     left = np.isin(rows.recording, group)
-    step, predicted = _step_without(fitted, left)
-    kept: FloatArray = np.asarray(np.linalg.qr(np.sqrt(SHRINK) * rows.jacobian[left], mode="r"))
+    kept = _kept(fitted, left)
+    step, predicted = _step_without(fitted, left, kept)
     rest = replace(_some(program, others), tether=Tether(fitted.theta, kept))
     before = rest.objective(Point(fitted.theta, tuple(point.nodes[k] for k in others)))
     moved = tuple(fitted.linear.recordings[k].nodes + fitted.linear.recordings[k].moved_by(step) for k in others)

@@ -136,7 +136,7 @@ def exchanged(
                 others = _others(bench, item, accepted, seen)
             else:
                 tried.append(rival.refitted(swapped, gains))
-        done[index], leader = _weighed_again(item, held, benchmark, tried, level, rng)
+        done[index], leader = weighed_again(item, held, benchmark, tried, level, rng)
         if leader is not None:
             current, benchmark = leader.fitted, Benchmark(leader.fitted)
             accepted = made[leader.key]
@@ -245,7 +245,7 @@ def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapp
     return best if best.astray and not current.astray else completed(best)
 
 
-def _weighed_again(
+def weighed_again(
     item: Round, held: Rival, benchmark: Benchmark, tried: Sequence[Rival], level: float, rng: np.random.Generator
 ) -> tuple[Round, Rival | None]:
     """Return a round with the chances that rivals have in the place of what it `held`, now that others are in.

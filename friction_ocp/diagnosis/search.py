@@ -24,20 +24,12 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn, without
+from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.stand_ins import fall_short, helps
-from friction_ocp.diagnosis.worth import (
-    gain,
-    innovations,
-    may_grow,
-    required,
-    samples,
-    shapes,
-    shortlist,
-)
+from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
+from friction_ocp.diagnosis.worth import gain, innovations, may_grow, required, samples, shapes, shortlist
 from friction_ocp.effects.effect import Key
-from friction_ocp.effects.registry import effects
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
 
@@ -299,37 +291,18 @@ class Search:
             self._weigh_shapes()
 
     def _weigh_shapes(self) -> None:
-        """Weigh the only addition against what it resembles or may be, each in the shape that the recordings give it.
+        """Weigh the only addition against others, each in the shape that the recordings give it."""
 
-        In the shape that the catalogue gives them the one may come nearer to what the other is on the machine, and a
-        shape tells apart what was as likely before.
-        """
+        def grown(rival: Rival) -> Round:
+            return self._round(self.bench.at(rival.fitted), [rival.key], NONE)
+
         held = self.accepted[0]
-        first = next(item for item in self.rounds if item.accepted is not None and item.accepted.key == held)
-        alike, choice, beaten = effects()[held[0]].resembles, first.choice, set[Key]()
-        most = (1.0 - MOST_OF) * first.before.cost + MOST_OF * self.bench.current.cost
-        near = [
-            item for item in choice.rivals if item.key[0] in alike and self._grows(item) and item.standing.cost < most
-        ]
-        others = sorted(near, key=lambda item: item.standing.cost)[:1]
-        if len(self.accepted) > 1:
-            others += [item for item in choice.aliases if item.key[0] != held[0] and item not in others]
-        for rival in others:
-            if self._exhausted():
-                break
-            done = self._round(self.bench.at(rival.fitted), [rival.key], NONE) if self._grows(rival) else None
-            grown = None if done is None else done.accepted
-            if done is not None and grown is not None and beats(grown.fitted, self.bench.current, self.level, self.rng):
-                beaten.add(self.accepted[0])
-                choice, self.bench = with_first(choice, rival), self.bench.at(grown.fitted)
-                self.rounds = [replace(first, choice=choice, accepted=rival), done]
-                self.accepted = [rival.key, grown.key]
-                continue
-            fitted = rival.fitted if grown is None else grown.fitted
-            if beats(self.bench.current, fitted, self.level, self.rng):
-                beaten.add(rival.key)
-        told = without(choice, beaten)
-        self.rounds = [replace(item, choice=told) if item.choice is choice else item for item in self.rounds]
+        is_own = [item.accepted is not None and item.accepted.key == held for item in self.rounds]
+        own = [item for item, yes in zip(self.rounds, is_own, strict=True) if yes]
+        dropped = [item for item, yes in zip(self.rounds, is_own, strict=True) if not yes]
+        current, own = weighed_in_shape(self.bench, own, grown, self._exhausted, self.level, self.rng)
+        self.bench, self.rounds = self.bench.at(current), [*dropped, *own]
+        self.accepted = [item.accepted.key for item in own if item.accepted is not None]
 
     def _grows(self, rival: Rival) -> bool:
         return may_grow(rival.screened.augmentation.drive, rival.key, self.bench.clues)

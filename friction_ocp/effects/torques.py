@@ -28,6 +28,7 @@ class UnbalanceEffect(AbstractEffect):
 
     name: ClassVar[str] = "unbalance"
     sentence: ClassVar[str] = "gravity pulls at the shaft: an unbalanced mass"
+    resembles: ClassVar[tuple[str, ...]] = ("cogging",)
 
     def places(self, drive: Drive) -> Iterable[str]:
         known = {shaft.name for shaft in drive.shafts if shaft.gravity is not None and shaft.gravity.torque != 0.0}

@@ -70,12 +70,14 @@ class Tether:
 
     theta: FloatArray
     """(parameters,) the point."""
-    root: FloatArray
-    """(k, parameters) R, with R'R the information."""
+    information: FloatArray
+    """(parameters, parameters)."""
 
-    def errors(self, theta: FloatArray) -> FloatArray:
-        """Return (k,) residuals."""
-        return self.root @ (theta - self.theta)
+    def pull(self, theta: FloatArray) -> tuple[float, FloatArray]:
+        """Return the cost of parameters elsewhere and its (parameters,) gradient."""
+        moved = theta - self.theta
+        gradient: FloatArray = self.information @ moved
+        return 0.5 * float(moved @ gradient), gradient
 
 
 @dataclass(frozen=True)
@@ -296,9 +298,8 @@ class Program:
 
     def _parameter_cost(self, theta: FloatArray) -> float:
         """Return the cost of what hangs on the parameters alone."""
-        held = np.zeros(0) if self.tether is None else self.tether.errors(theta)
-        points = sum(term.cost(self.space, theta) for term in self.static)
-        return _prior_cost(self.space, theta) + points + 0.5 * float(held @ held)
+        held = 0.0 if self.tether is None else self.tether.pull(theta)[0]
+        return _prior_cost(self.space, theta) + sum(term.cost(self.space, theta) for term in self.static) + held
 
     def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
         """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
@@ -317,10 +318,12 @@ class Program:
         stated = np.isfinite(self.space.prior_std)
         pull = np.where(stated, np.where(stated, self.space.prior_std, 1.0) ** -2.0, 0.0)
         hessian, gradient = np.diag(pull), pull * (theta - self.space.prior_mean)
-        terms = [term.residuals(self.space, theta) for term in self.static]
-        terms += [] if self.tether is None else [(self.tether.errors(theta), self.tether.root)]
         total = _prior_cost(self.space, theta)
-        for errors, slope in terms:
+        if self.tether is not None:
+            held, slope = self.tether.pull(theta)
+            total, hessian, gradient = total + held, hessian + self.tether.information, gradient + slope
+        for term in self.static:
+            errors, slope = term.residuals(self.space, theta)
             total += 0.5 * float(errors @ errors)
             hessian += slope.T @ slope
             gradient += slope.T @ errors

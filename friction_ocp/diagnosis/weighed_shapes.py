@@ -1,0 +1,105 @@
+"""The only addition against what it resembles or may be, each in the shape that the recordings give it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.diagnosis.bench import Bench
+from friction_ocp.diagnosis.benchmark import Benchmark, beats
+from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.reexamine import weighed_again
+from friction_ocp.diagnosis.refit import MOST_OF
+from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.select import Round, with_first, without
+from friction_ocp.diagnosis.worth import may_grow
+from friction_ocp.effects.effect import Key
+from friction_ocp.effects.registry import effects
+
+
+def weighed_in_shape(
+    bench: Bench,
+    rounds: Sequence[Round],
+    grown: Callable[[Rival], Round],
+    exhausted: Callable[[], bool],
+    level: float,
+    rng: np.random.Generator,
+) -> tuple[FittedModel, list[Round]]:
+    """Weigh the only addition, by its rounds, against others until effort is `exhausted`; return model and rounds then.
+
+    In the shape that the catalogue gives them the one may come nearer to what the other is on the machine, and a shape
+    tells apart what was as likely before. `grown` is the round that gives a rival its more general shape. What explains
+    more for certain takes the place, as does what explains the same with fewer parameters, or is the more probable;
+    what explains less for certain takes part no more.
+    """
+    first, *shaped = rounds
+    benchmark = Benchmark(bench.current)
+    tried, shapes = list[Rival](), dict[Key, list[Round]]()
+    for rival in _worth_weighing(first, bench, bool(shaped)):
+        if exhausted():
+            break
+        done = _likeliest(grown(rival)) if _grows(rival, bench) else None
+        shapes[rival.key] = [] if done is None else [done]
+        fitted = rival.fitted if done is None else _held(done).fitted
+        gains = -benchmark.dearer(fitted)
+        if benchmark.beaten(fitted, gains, level, rng) or benchmark.simpler(fitted):
+            held = _held(first).key
+            first = replace(first, choice=without(with_first(first.choice, rival), {held}), accepted=rival)
+            shaped, benchmark = shapes[rival.key], Benchmark(fitted)
+            tried = _gaining(tried, benchmark)
+        elif beats(benchmark.fitted, fitted, level, rng):
+            first = replace(first, choice=without(first.choice, {rival.key}))
+        else:
+            tried.append(rival.refitted(fitted, gains))
+    first, leader = weighed_again(first, _held(first), benchmark, tried, level, rng)
+    if leader is None:
+        return benchmark.fitted, [first, *shaped]
+    return leader.fitted, [first, *shapes[leader.key]]
+
+
+def _gaining(rivals: Sequence[Rival], benchmark: Benchmark) -> list[Rival]:
+    """Return rivals with their gains over another model."""
+    return [rival.refitted(rival.fitted, -benchmark.dearer(rival.fitted)) for rival in rivals]
+
+
+def _likeliest(shaped: Round) -> Round | None:
+    """Return a round with the shape that is more probable than none, be it not for certain, if there is one."""
+    choice = shaped.choice
+    if shaped.accepted is not None:
+        return shaped
+    likely = bool(choice.rivals) and choice.probabilities[0] > choice.nothing
+    return replace(shaped, accepted=choice.rivals[0]) if likely else None
+
+
+def _held(done: Round) -> Rival:
+    assert done.accepted is not None
+    return done.accepted
+
+
+def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
+    """Return what resembles the addition and came half as near, the nearest of that, and what has fewer parameters.
+
+    And what it may be as well, where it was given a more general shape since.
+    """
+    held, choice = _held(first), first.choice
+    alike = effects()[held.key[0]].resembles
+    most = (1.0 - MOST_OF) * first.before.cost + MOST_OF * bench.current.cost
+    near = [
+        item for item in choice.rivals if item.key[0] in alike and _grows(item, bench) and item.standing.cost < most
+    ]
+    others = sorted(near, key=lambda item: item.standing.cost)[:1]
+    benchmark, chances = Benchmark(bench.current), choice.chances
+    others += [
+        item
+        for item in choice.rivals
+        if item not in others and chances[item.key] > 0.0 and benchmark.simpler(item.standing)
+    ]
+    if shaped:
+        others += [item for item in choice.aliases if item.key[0] != held.key[0] and item not in others]
+    return others
+
+
+def _grows(rival: Rival, bench: Bench) -> bool:
+    return may_grow(rival.screened.augmentation.drive, rival.key, bench.clues)
