@@ -236,6 +236,7 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
         "significant": diagnosis.unexplained,
         "carries_over": diagnosis.carries_over,
         "stray": diagnosis.stray,
+        "lost": diagnosis.lost,
         "component": component,
         "ratio": diagnosis.remainder.ratio,
         "slow_torque": slow,

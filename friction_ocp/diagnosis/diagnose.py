@@ -111,6 +111,11 @@ class Diagnosis:
         """Whether free runs come no closer, and noise alone sets runs of the final model as far apart."""
         return not self._comes_closer and strays_as_far(self.final, self.after, self.problem.estimation.seed)
 
+    @cached_property
+    def lost(self) -> bool:
+        """Whether free runs of recordings that took no part are lost with and without what was added."""
+        return self.before.lost and self.after.lost
+
     @property
     def unexplained(self) -> bool:
         """Whether more than noise is left, where models were fitted or elsewhere."""
@@ -242,7 +247,11 @@ def _diagnosed(
 def _in_hindsight(found: Diagnosis) -> Diagnosis:
     """Return a diagnosis whose rounds are as sure as its end lets them be."""
     closed = found.closed.overall
-    lost = 0.0 if found.carries_over else 1.0 - (min(max(closed, 0.0), 1.0) if math.isfinite(closed) else 0.0)
+    lost = (
+        0.0
+        if found.carries_over or found.lost
+        else 1.0 - (min(max(closed, 0.0), 1.0) if math.isfinite(closed) else 0.0)
+    )
     return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, lost)))
 
 

@@ -127,7 +127,7 @@ class Standard:
         """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
 
         Free runs of a drive that nothing holds add up every small torque that is still missing; where they are lost
-        they show nothing at all. There the innovations may tell, as long as the runs get no worse; and everywhere where
+        they show nothing at all, and how far two are lost is chance: there the innovations tell; and everywhere where
         so much of what they have beyond noise goes as makes an effect of its own. Free runs that show something, and
         get worse, contradict them: what helps from sample to sample alone is not what moves the machine. Where nothing
         of them is left, they have to get worse for certain: runs that drift may do so by chance. Where almost all of
@@ -149,7 +149,7 @@ class Standard:
         if after.drowned:
             told = most
         elif before.lost:
-            told = most or after.excess() <= before.excess()
+            told = most or after.lost or after.excess() <= before.excess()
         elif one_step[1] <= DOUBTED - 1.0:
             told = most and shrink(before, after, seed).interval95[1] >= 0.0
         elif one_step[1] <= (1.0 - ALMOST) * one_step[0]:

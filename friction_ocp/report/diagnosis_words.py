@@ -25,6 +25,11 @@ def diagnosis_sentence(result: Json) -> str:
         case "undecided":
             likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
             return f"There is a gap, and several causes fit it: {likely}.{_stray(result)}"
+        case _ if accepted and _lost(result):
+            found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}. {_one_step(result)}"
+            left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
+            runs = "Free runs say nothing here: on recordings left out they lead nowhere with or without it"
+            return f"{found}; {left}{_stand_ins(result)}. {runs}.{_predicted(result)}{_cut_short(result)}"
         case _ if accepted and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
@@ -38,6 +43,19 @@ def diagnosis_sentence(result: Json) -> str:
         case _:
             told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
             return f"{told}{_cut_short(result)}"
+
+
+def _lost(result: Json) -> bool:
+    """Whether free runs do not come closer and are lost in any case."""
+    remainder = part(result, "remainder")
+    return not remainder.get("carries_over", True) and bool(remainder.get("lost"))
+
+
+def _one_step(result: Json) -> str:
+    """Say what all that was added does for the errors of one-step predictions."""
+    first = part(rows(result, "rounds")[0], "excess")["ratio"]
+    before, after = (significant(ratio, 2) for ratio in (first, part(result, "remainder")["ratio"]))
+    return f"Errors of one-step predictions have {after} times the power of their noise with it, {before} times without"
 
 
 def _predicted(result: Json) -> str:

@@ -25,6 +25,8 @@ MISSED: dict[str, tuple[int, int, Found]] = {
         [("presliding", "motor")],
     ),
     "a transmission whose loop is one of springs that slip": (20261207, 46, [("transmission_hysteresis", "gear-axis")]),
+    "cogging once a turn, of which unbalance is all but the overtones": (20261209, 39, [("cogging", "motor")]),
+    "unbalance, which cogging of a free period explains as well": (20261207, 136, [("unbalance", "motor")]),
     "the back-EMF of a motor that saturates falls with its torque": (20261207, 158, [("torque_saturation", "motor")]),
 }
 

@@ -98,6 +98,16 @@ def test_what_torque_noise_does_to_free_runs_is_no_evidence_against(
 
 @pytest.mark.usefixtures("looked_at")
 @pytest.mark.parametrize(
+    ("before", "after", "left", "material"),
+    [(4e12, 4e13, 3.5, True), (4e11, 4e12, 3.5, False), (4e12, 4e13, 4.8, False)],
+)
+def test_how_far_two_runs_are_lost_is_chance(before: float, after: float, left: float, material: bool) -> None:
+    """There the innovations tell, if the floors are not in doubt by as much; what alone gets lost is contradicted."""
+    assert Standard(drifting(before, 5.0, 1)).is_material(drifting(after, left, 2)) is material
+
+
+@pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(
     ("beyond", "share", "seed", "material"),
     [(0.3, 0.6, 1, True), (0.0, 0.6, 1, False), (0.0, 0.3, 1, True), (0.3, 0.6, 2, True), (0.0, 0.45, 2, False)],
 )
