@@ -30,7 +30,22 @@ def motor_torque(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
     if current is None:
         return 0.0
     made = motor.torque_constant * current * _left_of_torque(motor, current)
-    return made * torque_ripple_factor(mech, motor, motion)
+    return made * torque_ripple_factor(mech, motor, motion) - _rippling_drag(mech, motor, motion, current)
+
+
+def _rippling_drag(mech: Mechanism, motor: Motor, motion: Motion, current: Any) -> Any:
+    """Return what a ripple that is passed within a step takes of the mean torque beside its mean.
+
+    Where it raises the torque constant it raises the back-EMF, too, and the current of a winding without inductance is
+    the less: their product goes with the square of the ripple.
+    """
+    angle, passed = mech.angle_passed(motor.shaft, motion)
+    settled = mech.drive.driving_signal(motor) == "voltage" and not mech.has_winding_state(motor)
+    if motor.torque_ripple is None or passed is None or not settled:
+        return 0.0
+    left = _left_of_torque(motor, current) * _left_of_emf(motor, current)
+    drag = motor.torque_constant**2 / motor.resistance * mech.shaft_speed(motor.shaft, motion)
+    return _enabled(mech, motor, drag * left * motor.torque_ripple.variance(angle, passed))
 
 
 def _left_of_torque(motor: Motor, current: Any) -> Any:

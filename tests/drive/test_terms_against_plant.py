@@ -93,6 +93,17 @@ def test_terms_follow_the_plant(name: str) -> None:
     assert worst(truth, without, "motor.omega") > 20 * STEP_ERROR
 
 
+def test_a_ripple_passed_within_a_few_steps_brakes_as_in_the_plant() -> None:
+    """A fast motor on a voltage: torque constant and back-EMF ripple together, and drag goes with their square."""
+    law = PlantFriction("coulomb_viscous", tau_c=0.01, viscous=1e-4)
+    ripple = PlantRipple(0.7, 0.5, -0.2)
+    motor = PlantMotor("drive", "motor", drive="voltage", torque_constant=0.1, resistance=2.0, torque_ripple=ripple)
+    plant = Plant((PlantShaft("motor", 0.02, law),), (), (motor,))
+    truth, run = Twin(plant, {"drive.voltage": 96.0}).run(1.0)
+    assert np.max(np.abs(truth["motor.omega"])) * 1e-3 > 0.2 * ripple.period
+    assert worst(truth, run, "motor.theta", "motor.omega") < STEP_ERROR
+
+
 @pytest.mark.parametrize("signal", ["theta", "omega"])
 def test_eccentric_sensors_read_as_in_the_plant(signal: str) -> None:
     """An encoder with a once-per-turn error reads the same over several turns in both directions."""
