@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -305,16 +305,20 @@ def upwards(size: float) -> Free:
     return Free(size, 0.0, RANGE * size)
 
 
-def spring_shares() -> tuple[Free, Free, Free]:
-    """Return what springs beside something that relaxes carry, to be fitted."""
-    return Free(SHARE, 0.0, 1.0), Free(1.0, 0.0, UNEQUAL), Free(1.0, 0.0, UNEQUAL)
+Springs = TypeVar("Springs")
 
 
-def beside(path: str, scale: str, relaxing: float) -> tuple[dict[str, float], tuple[Trial, ...]]:
-    """Return off values and trials of springs that slip beside what relaxes over `relaxing`."""
+def springs_beside(
+    kind: Callable[[Free, Free, Free, Free], Springs], path: str, scale: str, relaxing: Free, now: float
+) -> tuple[Springs, dict[str, float], tuple[Trial, ...]]:
+    """Return springs that slip beside something that relaxes, to be fitted, with their off values and trials.
+
+    `scale` names what both have of `relaxing`, which is `now` that of the latter.
+    """
+    springs = kind(Free(SHARE, 0.0, 1.0), Free(1.0, 0.0, UNEQUAL), Free(1.0, 0.0, UNEQUAL), relaxing)
     equal, carried = {f"{path}.soft": 1.0, f"{path}.stiff": 1.0}, {f"{path}.share": SHARE}
-    trials = tuple(Trial((carried,), {**equal, f"{path}.{scale}": factor * relaxing}) for factor in SCALES)
-    return {f"{path}.share": 0.0}, trials
+    trials = tuple(Trial((carried,), {**equal, f"{path}.{scale}": factor * now}) for factor in SCALES)
+    return springs, {f"{path}.share": 0.0}, trials
 
 
 def motor_of(drive: Drive, shaft: str) -> Motor | None:

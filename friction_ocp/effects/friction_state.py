@@ -15,10 +15,9 @@ from friction_ocp.effects.effect import (
     Augmentation,
     Clues,
     Trial,
-    beside,
     change_shaft,
     moving_shafts,
-    spring_shares,
+    springs_beside,
 )
 from friction_ocp.effects.friction_curve import is_dry, stribeck_speed
 from friction_ocp.friction.composite import Bristle, Bristled, BristleSprings, with_bristle
@@ -69,10 +68,10 @@ class PreslidingEffect(AbstractEffect):
         if not isinstance(law, Bristled) or law.bristle.springs is not None or not isinstance(law.bristle.sigma0, Free):
             return None
         stiffness = law.bristle.sigma0
-        springs = BristleSprings(*spring_shares(), stiffness)
+        now = clues.numbers.get(f"{stem}.sigma0", stiffness.guess)
+        springs, off, trials = springs_beside(BristleSprings, f"{stem}.springs", "stiffness", stiffness, now)
         law = replace(law, bristle=replace(law.bristle, springs=springs))
         added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
-        off, trials = beside(f"{stem}.springs", "stiffness", clues.numbers.get(f"{stem}.sigma0", stiffness.guess))
         return Augmentation(added, off, trials)
 
 

@@ -15,9 +15,8 @@ from friction_ocp.effects.effect import (
     Augmentation,
     Clues,
     Trial,
-    beside,
     change_transmission,
-    spring_shares,
+    springs_beside,
     transmission,
     upwards,
 )
@@ -187,9 +186,9 @@ class TransmissionHysteresisEffect(AbstractEffect):
         loop = transmission(drive, place).hysteresis
         if loop is None or loop.springs is not None or not isinstance(loop.twist, Free):
             return None
-        path, springs = f"{place}.hysteresis", LoopSprings(*spring_shares(), loop.twist)
+        path, now = f"{place}.hysteresis.springs", clues.numbers.get(f"{place}.hysteresis.twist", loop.twist.guess)
+        springs, off, trials = springs_beside(LoopSprings, path, "twist", loop.twist, now)
         added = change_transmission(drive, place, hysteresis=replace(loop, springs=springs))
-        off, trials = beside(f"{path}.springs", "twist", clues.numbers.get(f"{path}.twist", loop.twist.guess))
         return Augmentation(added, off, trials)
 
 
