@@ -65,8 +65,8 @@ class WarmUpEffect(AbstractEffect):
                 for one in times
                 for share in (0.0, 1.0)
             )
-        element, inside = replace(shaft.friction, warm_up=part), (f"{path}.viscous_excess",) if len(off) > 1 else ()
-        return Augmentation(change_shaft(drive, place, friction=element), off, trials, inside=inside)
+        added = change_shaft(drive, place, friction=replace(shaft.friction, warm_up=part))
+        return Augmentation(added, off, trials, inside=tuple(off))
 
 
 def _typical_loss(drive: Drive, place: str, clues: Clues) -> float:

@@ -216,8 +216,9 @@ class SensorEccentricityEffect(AbstractEffect):
         size, path, offset = 1e-3, f"{place}.eccentricity", f"{place}.offset"
         amplitude = Free(size, -LARGEST, LARGEST)
         sizes = {f"{path}.cosine": size, f"{path}.sine": size}
+        waves = tuple(sizes)
         added = change_channel(drive, place, eccentricity=Eccentricity(amplitude, amplitude))
         if channel(drive, place).offset == 0.0:
             added, sizes = change_channel(added, place, offset=either_way(size)), {**sizes, offset: size}
         trial = Trial(tuple({name: value} for name, value in sizes.items()))
-        return Augmentation(added, dict.fromkeys(sizes, 0.0), (trial,))
+        return Augmentation(added, dict.fromkeys(sizes, 0.0), (trial,), inside=waves)

@@ -68,7 +68,7 @@ class SensorGainEffect(AbstractEffect):
         gain, path = float(channel(drive, place).gain), f"{place}.gain"
         low, high = sorted((gain / PLAUSIBLE, gain * PLAUSIBLE))
         added = change_channel(drive, place, gain=Free(gain, low, high))
-        return Augmentation(added, {path: gain}, (Trial(({path: 1.02 * gain},)),))
+        return Augmentation(added, {path: gain}, (Trial(({path: 1.02 * gain},)),), inside=(path,))
 
 
 class SensorDelayEffect(AbstractEffect):

@@ -12,9 +12,12 @@ from friction_ocp.diagnosis import worth
 from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors
+from friction_ocp.diagnosis.rival import is_another
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.diagnosis.worth import Standard, with_resembling
-from friction_ocp.effects.effect import Augmentation, Trial
+from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft
+from friction_ocp.effects.effect import Augmentation, Clues, Trial
+from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.score import FreeRun
 
 FLOOR = 0.01
@@ -41,6 +44,21 @@ def test_far_from_the_recordings_an_effect_is_tried_at_all_its_places() -> None:
     found = [seen("cogging", "motor", 100.0), seen("asymmetry", "motor", 50.0), seen("asymmetry", "load", 0.1)]
     assert with_resembling(found[:2], found) == found[:2]
     assert with_resembling(found[:2], found, astray=True) == found
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "path"),
+    [("sensor_gain", "torque", "torque.gain"), ("sensor_eccentricity", "theta", "theta.eccentricity.sine")],
+)
+def test_what_is_as_large_as_it_may_be_is_another_effect(effect: str, place: str, path: str) -> None:
+    """An angle that is half a radian off is not that of an eccentric disc, nor half as much again a wrong scale."""
+    channels = (Channel("torque", "drive.torque", "input"), Channel("theta", "motor.theta"))
+    drive = Drive((Shaft("motor", 0.02),), (), (Motor("drive", "motor"),), None, channels)
+    added = effects()[effect].augment(drive, place, Clues((), {}, {"motor": 0.1}))
+    candidate = Screened(effect, place, 1.0, 0.0, (), added)
+    for ended, another in ((path, True), ("motor.inertia", False)):
+        fitted = cast(FittedModel, SimpleNamespace(at_bound=lambda name, ended=ended: name == ended))
+        assert is_another(candidate, fitted) is another
 
 
 def drifting(power: float, beyond: float, seed: int, drift: float = 0.0) -> FittedModel:
