@@ -7,12 +7,8 @@ from collections.abc import Callable
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer
-from friction_ocp.diagnosis.worth import ALMOST, innovations, samples
+from friction_ocp.diagnosis.worth import ALMOST, PART, innovations, samples
 
-PART = 0.25
-"""Share of the gap below which additions that leave more than noise are taken back: less than that was a stand-in for
-something outside the catalogue in all 3 cases of the blind suite of seed 20261130. On real machines, where something is
-always left, half of the gap may be all that the largest effect explains."""
 SHARED = 0.5
 """Share that free runs of recordings left out lose over that of the fitted ones, at least: causes came to 0.7 and more,
 stand-ins for a limited rate of the current to 0.3 and 0.4 (blind suites of seeds 20261203 and 20261204)."""
