@@ -44,6 +44,10 @@ class Benchmark:
         """Whether another model explains more, and its (blocks,) gains are more than chance."""
         return other.cost < self.fitted.cost - UNIMPORTANT and self.certain(gains, level, rng)
 
+    def yields(self, other: FittedModel, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
+        """Whether another model, with its (blocks,) gains, takes the place of this one: it beats it, or is simpler."""
+        return self.beaten(other, gains, level, rng) or self.simpler(other)
+
     def certain(self, gains: FloatArray, level: float, rng: np.random.Generator) -> bool:
         """Whether gains in the blocks of this model are more than chance makes of nothing."""
         return bool(np.quantile(resamples(self.blocks, rng) @ gains, level) > 0)

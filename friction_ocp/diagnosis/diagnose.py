@@ -246,13 +246,10 @@ def _diagnosed(
 
 def _in_hindsight(found: Diagnosis) -> Diagnosis:
     """Return a diagnosis whose rounds are as sure as its end lets them be."""
-    closed = found.closed.overall
-    lost = (
-        0.0
-        if found.carries_over or found.lost
-        else 1.0 - (min(max(closed, 0.0), 1.0) if math.isfinite(closed) else 0.0)
-    )
-    return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, lost)))
+    overall = found.closed.overall
+    closed = min(max(overall, 0.0), 1.0) if math.isfinite(overall) else 0.0
+    doubt = 0.0 if found.carries_over or found.lost else 1.0 - closed
+    return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, doubt)))
 
 
 def _checked(

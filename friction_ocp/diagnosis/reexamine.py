@@ -127,12 +127,12 @@ def exchanged(
             if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
                 continue
             gains = -benchmark.dearer(swapped)
-            if benchmark.beaten(swapped, gains, level, rng) or benchmark.simpler(swapped):
+            if benchmark.yields(swapped, gains, level, rng):
                 seen.add(held.key)
                 former = [held.refitted(current, gains), *tried]
                 held, current, accepted, benchmark = rival, swapped, keys, Benchmark(swapped)
                 item = replace(item, accepted=rival, choice=turned(item.choice, rival))
-                tried = [other.refitted(other.fitted, -benchmark.dearer(other.fitted)) for other in former]
+                tried = gaining(former, benchmark)
                 others = _others(bench, item, accepted, seen)
             else:
                 tried.append(rival.refitted(swapped, gains))
@@ -243,6 +243,11 @@ def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapp
     ends = [polished(model, bench.base.footing, theta, None) for theta in begins]
     best = min(ends, key=lambda end: end.objective)
     return best if best.astray and not current.astray else completed(best)
+
+
+def gaining(rivals: Sequence[Rival], benchmark: Benchmark) -> list[Rival]:
+    """Return rivals with their gains over another model."""
+    return [rival.refitted(rival.fitted, -benchmark.dearer(rival.fitted)) for rival in rivals]
 
 
 def weighed_again(

@@ -28,7 +28,7 @@ from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.stand_ins import fall_short, helps
 from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
-from friction_ocp.diagnosis.worth import gain, innovations, may_grow, required, samples, shapes, shortlist
+from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, required, samples, shapes, shortlist
 from friction_ocp.effects.effect import Key
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
@@ -144,7 +144,7 @@ class Search:
         rival = next(iter(done.choice.rivals), None)
         if rival is None or current.cost - rival.standing.cost < MOST_OF * (current.cost - noise):
             return None
-        if not self._grows(rival) or self._exhausted():
+        if not grows(rival, self.bench.clues) or self._exhausted():
             return None
         bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
         grown = self._round(bench, keys, NONE)
@@ -188,7 +188,7 @@ class Search:
         clues, nearer = self.bench.clues, list[Rival]()
         if not may_grow(self.bench.current.model.problem.drive, last.accepted.key, clues):
             found = [rival for rival in last.choice.rivals if rival.standing.cost < cost]
-            nearer = [rival for rival in found if may_grow(rival.screened.augmentation.drive, rival.key, clues)]
+            nearer = [rival for rival in found if grows(rival, clues)]
         for rival in (*shown(last.choice.aliases), *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue
@@ -303,9 +303,6 @@ class Search:
         current, own = weighed_in_shape(self.bench, own, grown, self._exhausted, self.level, self.rng)
         self.bench, self.rounds = self.bench.at(current), [*dropped, *own]
         self.accepted = [item.accepted.key for item in own if item.accepted is not None]
-
-    def _grows(self, rival: Rival) -> bool:
-        return may_grow(rival.screened.augmentation.drive, rival.key, self.bench.clues)
 
     def _left_out(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
         """Return free runs where recordings took no part, of the base model and of the current one of a bench."""

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench
-from friction_ocp.diagnosis.benchmark import Benchmark, beats
+from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.reexamine import weighed_again
+from friction_ocp.diagnosis.polishing import UNIMPORTANT
+from friction_ocp.diagnosis.reexamine import gaining, weighed_again
 from friction_ocp.diagnosis.refit import MOST_OF
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import Round, with_first, without
-from friction_ocp.diagnosis.worth import may_grow
+from friction_ocp.diagnosis.worth import grows
 from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 
@@ -40,16 +41,16 @@ def weighed_in_shape(
     for rival in _worth_weighing(first, bench, bool(shaped)):
         if exhausted():
             break
-        done = _likeliest(grown(rival)) if _grows(rival, bench) else None
+        done = _likeliest(grown(rival)) if grows(rival, bench.clues) else None
         shapes[rival.key] = [] if done is None else [done]
         fitted = rival.fitted if done is None else _held(done).fitted
         gains = -benchmark.dearer(fitted)
-        if benchmark.beaten(fitted, gains, level, rng) or benchmark.simpler(fitted):
+        if benchmark.yields(fitted, gains, level, rng):
             held = _held(first).key
             first = replace(first, choice=without(with_first(first.choice, rival), {held}), accepted=rival)
             shaped, benchmark = shapes[rival.key], Benchmark(fitted)
-            tried = _gaining(tried, benchmark)
-        elif beats(benchmark.fitted, fitted, level, rng):
+            tried = gaining(tried, benchmark)
+        elif fitted.cost > benchmark.fitted.cost + UNIMPORTANT and benchmark.certain(-gains, level, rng):
             first = replace(first, choice=without(first.choice, {rival.key}))
         else:
             tried.append(rival.refitted(fitted, gains))
@@ -57,11 +58,6 @@ def weighed_in_shape(
     if leader is None:
         return benchmark.fitted, [first, *shaped]
     return leader.fitted, [first, *shapes[leader.key]]
-
-
-def _gaining(rivals: Sequence[Rival], benchmark: Benchmark) -> list[Rival]:
-    """Return rivals with their gains over another model."""
-    return [rival.refitted(rival.fitted, -benchmark.dearer(rival.fitted)) for rival in rivals]
 
 
 def _likeliest(shaped: Round) -> Round | None:
@@ -87,7 +83,9 @@ def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
     alike = effects()[held.key[0]].resembles
     most = (1.0 - MOST_OF) * first.before.cost + MOST_OF * bench.current.cost
     near = [
-        item for item in choice.rivals if item.key[0] in alike and _grows(item, bench) and item.standing.cost < most
+        item
+        for item in choice.rivals
+        if item.key[0] in alike and grows(item, bench.clues) and item.standing.cost < most
     ]
     others = sorted(near, key=lambda item: item.standing.cost)[:1]
     benchmark, chances = Benchmark(bench.current), choice.chances
@@ -99,7 +97,3 @@ def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
     if shaped:
         others += [item for item in choice.aliases if item.key[0] != held.key[0] and item not in others]
     return others
-
-
-def _grows(rival: Rival, bench: Bench) -> bool:
-    return may_grow(rival.screened.augmentation.drive, rival.key, bench.clues)

@@ -26,9 +26,10 @@ or a gain and an offset of one sensor, would crowd out what is different."""
 WORTH_REFITTING = 0.1
 """Predicted gain over the largest one below which a candidate is not refitted: the prediction is that good."""
 PART = 0.25
-"""Share of the gap below which additions that leave more than noise are taken back: less than that was a stand-in for
-something outside the catalogue in all 3 cases of the blind suite of seed 20261130. On real machines, where something is
-always left, half of the gap may be all that the largest effect explains."""
+"""Share of the gap, or of the innovations where free runs are lost, below which additions that leave more than noise
+are taken back: less was a stand-in for something outside the catalogue in all 3 cases of the blind suite of seed
+20261130. On real machines, where something is always left, half of the gap may be all that the largest effect
+explains."""
 MATERIAL = 0.1
 """Share of the power of free-run errors that an addition must take away: 5 % of the error, the doubt about floors."""
 OF_ALL, OF_REST = 0.1, 0.4
@@ -52,6 +53,11 @@ def may_grow(drive: Drive, key: Key, clues: Clues) -> bool:
     """Whether an effect that a drive has may have a more general shape there."""
     effect, place = key
     return effects()[effect].reshaped(drive, place, clues) is not None
+
+
+def grows(rival: Rival, clues: Clues) -> bool:
+    """Whether the effect of a rival may have a more general shape in its own model."""
+    return may_grow(rival.screened.augmentation.drive, rival.key, clues)
 
 
 def shortlist(found: Sequence[Screened], limit: float) -> list[Screened]:

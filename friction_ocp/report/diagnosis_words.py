@@ -25,21 +25,19 @@ def diagnosis_sentence(result: Json) -> str:
         case "undecided":
             likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
             return f"There is a gap, and several causes fit it: {likely}.{_stray(result)}"
-        case _ if accepted and _lost(result):
-            found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}. {_one_step(result)}"
-            left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
-            runs = "Free runs say nothing here: on recordings left out they lead nowhere with or without it"
-            return f"{found}; {left}{_stand_ins(result)}. {runs}.{_predicted(result)}{_cut_short(result)}"
-        case _ if accepted and not part(result, "remainder").get("carries_over", True):
+        case _ if accepted and not _lost(result) and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
             cause = "The cause is probably another."
             told = f"There is a gap beyond the noise; {where}, but {doubt}."
             return f"{told}{_predicted(result) or f' {cause}'}{_cut_short(result)}"
         case _ if accepted:
-            found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}, with which {_closed(closed)}"
+            found, lost = f"Explained in part: the model lacked {_listed(_with_rivals(result))}", _lost(result)
+            helped = f". {_one_step(result)}" if lost else f", with which {_closed(closed)}"
             left = f"what is left{_place(result)} is more than noise, and nothing in the catalogue explains it"
-            return f"{found}; {left}{_stand_ins(result)}.{_predicted(result)}{_cut_short(result)}"
+            runs = " Free runs say nothing here: on recordings left out they lead nowhere with or without it."
+            told = f"{found}{helped}; {left}{_stand_ins(result)}.{runs if lost else ''}"
+            return f"{told}{_predicted(result)}{_cut_short(result)}"
         case _:
             told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
             return f"{told}{_cut_short(result)}"
