@@ -17,7 +17,7 @@ from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import losses, motor_loads, through_joint, transmitted_torque
 from friction_ocp.drive.mechanism import WARMTH, Mechanism, Motion, column, mechanism, symbol
-from friction_ocp.drive.motors import extra_rates, lag_rates
+from friction_ocp.drive.motors import extra_rates, following_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
 from friction_ocp.drive.torques import applied_torques, elastic_torque, loop_rates
@@ -38,7 +38,7 @@ class _Symbols:
     speeds: ca.SX
     bristle: ca.SX
     extra: ca.SX
-    lagged: ca.SX
+    following: ca.SX
     loops: ca.SX
     warmth: ca.SX
     memory: ca.SX
@@ -48,7 +48,7 @@ class _Symbols:
     @property
     def parts(self) -> tuple[ca.SX, ...]:
         """The states by their kind."""
-        return self.angles, self.speeds, self.bristle, self.extra, self.lagged, self.loops, self.warmth
+        return self.angles, self.speeds, self.bristle, self.extra, self.following, self.loops, self.warmth
 
     @property
     def x(self) -> list[ca.SX]:
@@ -69,7 +69,7 @@ def dae(drive: Drive, width: float) -> Dae:
     mech = mechanism(drive)
     symbols = _symbols(mech)
     groups = group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds)
-    at = Motion(*groups, symbols.extra, symbols.memory, symbols.lagged, symbols.loops, symbols.warmth)
+    at = Motion(*groups, symbols.extra, symbols.memory, symbols.following, symbols.loops, symbols.warmth)
     torques = applied_torques(mech, at, width)
     load = _loads(mech, symbols, at, width)
     friction, rates = _friction(mech, symbols, at, load, width)
@@ -90,7 +90,8 @@ def dae(drive: Drive, width: float) -> Dae:
             for channel, value in zip(mech.drive.outputs, outputs, strict=True)
         ),
         ode=ca.vertcat(
-            *(column([*turning, *speeding, *rates]), extra_rates(mech, at), lag_rates(mech, at), loop_rates(mech, at)),
+            *(column([*turning, *speeding, *rates]), extra_rates(mech, at), following_rates(mech, at)),
+            loop_rates(mech, at),
             _warmth_rates(mech, symbols, at, load),
         ),
         alg=symbols.torques - found,
@@ -100,14 +101,14 @@ def dae(drive: Drive, width: float) -> Dae:
 def _symbols(mech: Mechanism) -> _Symbols:
     counts = (
         *(mech.angle_groups, mech.free_groups, mech.bristle_names, mech.extra_names),
-        *(mech.lagging, mech.loop_names, mech.warming),
+        *(mech.following_names, mech.loop_names, mech.warming),
     )
     names = iter(mech.state_names)
     angles, speeds, bristle, *others = (column([symbol(next(names)) for _ in part]) for part in counts)
-    extra, lagged, loops, warmth = others
+    extra, following, loops, warmth = others
     memory = column([symbol(name) if name == HELD else 0.0 for name in mech.memory_names])
     joints = column([symbol(f"{joint.name}.torque") for joint in mech.loaded_joints()])
-    return _Symbols(angles, speeds, bristle, extra, lagged, loops, warmth, memory, joints)
+    return _Symbols(angles, speeds, bristle, extra, following, loops, warmth, memory, joints)
 
 
 def _loads(mech: Mechanism, symbols: _Symbols, at: Motion, width: float) -> dict[str, Any]:
@@ -157,7 +158,7 @@ def _state_unit(mech: Mechanism, name: str) -> str:
     drive, (part, _, signal) = mech.drive, name.partition(".")
     if drive.controller is not None and part == "controller":
         return command_unit(drive, drive.controller)
-    if signal == "lagged":
+    if name in mech.following_names:
         return signal_unit(drive, f"{part}.{mech.drive.driving_signal(drive.motor(part))}")
     if name.endswith(WARMTH):
         return si_unit("dimensionless")

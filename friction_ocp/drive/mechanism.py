@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import has_integral, memory_names
+from friction_ocp.drive.following import PARTS, Follower
 from friction_ocp.drive.inputs import TIME, input_symbols, moved_from_behind
 from friction_ocp.drive.live_terms import live_terms
 from friction_ocp.drive.loops import Loop
@@ -58,8 +59,8 @@ class Motion:
     """Continuous states: winding currents and controller integrals."""
     memory: ca.SX
     """What a sampled controller holds between ticks."""
-    lagged: ca.SX | None = None
-    """What drives the motors that lag behind their commands."""
+    following: ca.SX | None = None
+    """What follows the commands of motors late."""
     loops: ca.SX | None = None
     """Deflections of the loops of transmissions at the start of the step; None leaves loops out."""
     warmth: ca.SX | None = None
@@ -119,9 +120,33 @@ class Mechanism:
         return tuple(names)
 
     @property
-    def lagging(self) -> tuple[Motor, ...]:
+    def following(self) -> tuple[Motor, ...]:
         """Motors that follow their commands late."""
-        return tuple(motor for motor in self.drive.motors if motor.lag is not None and self.drive.driving_signal(motor))
+        return tuple(motor for motor in self.drive.motors if self._lateness(motor))
+
+    @property
+    def following_names(self) -> tuple[str, ...]:
+        """Names of the states of what follows commands late."""
+        late = ((motor.name, part) for motor in self.following for part in self._lateness(motor))
+        return tuple(f"{name}.{state}" for name, part in late for state in PARTS[part])
+
+    def followers(self, states: ca.SX) -> dict[str, Follower]:
+        """Return what follows commands late, by motor, in given states."""
+        found: dict[str, Follower] = {}
+        rest = ca.vertsplit(states) if states.numel() else []
+        for motor in self.following:
+            late = self._lateness(motor)
+            count = sum(len(PARTS[part]) for part in late)
+            found[motor.name] = Follower(late.get("dead_time"), late.get("lag"), tuple(rest[:count]))
+            rest = rest[count:]
+        return found
+
+    def _lateness(self, motor: Motor) -> dict[str, Any]:
+        """Return the times that make what drives a motor late, without a dead time that makes all outputs late."""
+        if not self.drive.driving_signal(motor):
+            return {}
+        dead = None if self.drive.late_as_a_whole else motor.dead_time
+        return {name: time for name, time in (("dead_time", dead), ("lag", motor.lag)) if time is not None}
 
     @property
     def looping(self) -> tuple[Transmission, ...]:
@@ -157,14 +182,14 @@ class Mechanism:
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of all states: angles, speeds, bristles, currents and integrals, lags, loops, warmth, memory."""
+        """Names of all states: angles, speeds, bristles, currents and integrals, followers, loops, warmth, memory."""
         roots = self.topology.roots
         return (
             *(f"{roots[g]}.theta" for g in self.angle_groups),
             *(f"{roots[g]}.omega" for g in self.free_groups),
             *self.bristle_names,
             *self.extra_names,
-            *(f"{motor.name}.lagged" for motor in self.lagging),
+            *self.following_names,
             *self.loop_names,
             *(name + WARMTH for name in self.warming),
             *self.memory_names,

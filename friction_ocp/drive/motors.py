@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import ControlSignals, command, has_integral, integral_rate, saturate
+from friction_ocp.drive.following import Follower
 from friction_ocp.drive.mechanism import FEEDBACK_DELAY, Mechanism, Motion, column
 from friction_ocp.drive.parts import Controller, Motor
 from friction_ocp.friction.smoothing import exp, log1p_mean, power, sqrt, where
@@ -125,11 +126,11 @@ def motor_voltage(mech: Mechanism, motor: Motor, motion: Motion) -> Any | None:
 
 
 def _driving(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
-    """Return the torque, current or voltage that drives a motor, behind its lag."""
-    if motor.lag is None:
+    """Return the torque, current or voltage that drives a motor, behind its command."""
+    if all(item.name != motor.name for item in mech.following):
         return motor_command(mech, motor, motion)
-    assert motion.lagged is not None
-    return motion.lagged[[item.name for item in mech.lagging].index(motor.name)]
+    assert motion.following is not None
+    return mech.followers(motion.following)[motor.name].value
 
 
 def motor_command(mech: Mechanism, motor: Motor, motion: Motion) -> Any:
@@ -152,18 +153,36 @@ def _controlled(mech: Mechanism, controller: Controller, motion: Motion) -> Any:
     return saturate(controller, command(controller, seen_by_controller(mech, motion), integral))
 
 
-def commands(mech: Mechanism, motion: Motion) -> ca.SX:
-    """Return what the motors that lag are to follow."""
-    return column([motor_command(mech, motor, motion) for motor in mech.lagging])
+def followers(mech: Mechanism, motion: Motion) -> list[tuple[Follower, Any]]:
+    """Return what follows commands late, each with its command."""
+    if motion.following is None:
+        return []
+    found = mech.followers(motion.following)
+    return [(found[motor.name], motor_command(mech, motor, motion)) for motor in mech.following]
+
+
+def at_rest(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return the states of what follows commands late, these having been the same for long."""
+    begun = mech.followers(ca.SX.zeros(len(mech.following_names)))
+    starts = ((begun[motor.name], motor_command(mech, motor, motion)) for motor in mech.following)
+    return column([one for item, wanted in starts for one in item.at_rest(wanted)])
 
 
 def shown_lag(mech: Mechanism, motor: Motor, motion: Motion, signal: str) -> Motion:
     """Return the motion with what drives a motor as far behind its command as a recording of that signal shows it."""
     if motor.lag is None or motor.lag_hidden is None or mech.drive.driving_signal(motor) != signal:
         return motion
-    assert motion.lagged is not None
-    hidden = column([motor.lag_hidden if item.name == motor.name else 0.0 for item in mech.lagging])
-    return replace(motion, lagged=motion.lagged + hidden * (commands(mech, motion) - motion.lagged))
+    names = [item.name for item in mech.following]
+    return replace(
+        motion,
+        following=column(
+            [
+                one + (motor.lag_hidden if name == motor.name else 0.0) * (rest - one)
+                for name, (item, wanted) in zip(names, followers(mech, motion), strict=True)
+                for one, rest in zip(item.states, item.at_rest(wanted), strict=True)
+            ]
+        ),
+    )
 
 
 def follows_smooth_command(mech: Mechanism, motor: Motor) -> bool:
@@ -175,11 +194,9 @@ def follows_smooth_command(mech: Mechanism, motor: Motor) -> bool:
     return mech.drive.controller is not None and mech.drive.controller.sample_time is None
 
 
-def lag_rates(mech: Mechanism, motion: Motion) -> ca.SX:
-    """Return the time derivatives of what drives the motors that lag; lags are positive here."""
-    if motion.lagged is None or not mech.lagging:
-        return ca.SX(0, 1)
-    return (commands(mech, motion) - motion.lagged) / column([motor.lag for motor in mech.lagging])
+def following_rates(mech: Mechanism, motion: Motion) -> ca.SX:
+    """Return the time derivatives of what follows commands late; its times are positive here."""
+    return column([rate for item, wanted in followers(mech, motion) for rate in item.rates(wanted)])
 
 
 def seen_by_controller(mech: Mechanism, motion: Motion) -> ControlSignals:

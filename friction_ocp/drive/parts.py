@@ -207,13 +207,14 @@ SHARPNESS = 2.0
 class Motor:
     """An electric motor on a shaft; its back-EMF constant equals its torque constant.
 
-    What drives it (current, torque or voltage) follows its command with the time constant `lag`, and all that is seen
-    of the drive is later than that by `dead_time`. A recorded current or voltage lags less than the motor by the share
-    `lag_hidden`: with 1 it is the command. The torque that a current i would make is divided by
-    (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the torque over the torque constant
-    where torque drives it; with a `saturation_tail` q by (1 + q s)^(1/q), s = (saturation i^2)^(p/2) / p, which is the
-    same for q = p, falls further for less, as an exponential for 0 and as 1 - s for -1. The back-EMF falls alike where
-    flux is missing, and keeps what losses take: `saturation_in_emf` is the share that it lacks.
+    What drives it (current, torque or voltage) follows its command after `dead_time` with a time constant `lag`; where
+    it is alone and no controller is simulated, all that is seen of the drive is later by the dead time. A recorded
+    current or voltage lags less than the motor by the share `lag_hidden`: with 1 it is the command. The torque that a
+    current i would make is divided by (1 + (saturation i^2)^(p/2))^(1/p), where p is `saturation_sharpness` and i the
+    torque over the torque constant where torque drives it; with a `saturation_tail` q by (1 + q s)^(1/q),
+    s = (saturation i^2)^(p/2) / p, which is the same for q = p, falls further for less, as an exponential for 0 and as
+    1 - s for -1. The back-EMF falls alike where flux is missing, and keeps what losses take: `saturation_in_emf` is the
+    share that it lacks.
     """
 
     name: str
@@ -331,6 +332,11 @@ class Drive:
             if f"{motor.name}.{signal}" in given or (controller is not None and controller.output == signal):
                 return signal
         return "current" if f"{motor.name}.current_command" in given else None
+
+    @property
+    def late_as_a_whole(self) -> bool:
+        """Whether a command that is acted on late makes all outputs as late: nothing else moves or closes a loop."""
+        return self.controller is None and len(self.motors) == 1
 
     @property
     def prescribing(self) -> tuple[Channel, ...]:

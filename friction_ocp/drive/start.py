@@ -10,7 +10,7 @@ import casadi as ca
 from friction_ocp.drive.coordinates import pick, prescribed_motion
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, deflection_names
-from friction_ocp.drive.motors import commands, seen_by_controller
+from friction_ocp.drive.motors import at_rest, seen_by_controller
 from friction_ocp.drive.parts import Channel, Shaft
 from friction_ocp.drive.torques import applied_torques
 from friction_ocp.friction.bristle import AbstractBristleLaw
@@ -21,8 +21,8 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
     """Return the state that measured motion suggests: no twist, bristles as steady motion or a balance has them."""
     q, v = _measured_motion(mech, y, dy)
     at = Motion(q, v, ca.SX.zeros(len(mech.extra_names)), ca.SX.zeros(len(mech.memory_names)))
-    lagged = commands(mech, at)
-    at = replace(at, lagged=lagged)
+    following = at_rest(mech, at)
+    at = replace(at, following=following)
     acceleration = _measured_accelerations(mech, dy, ddy)
     deflections = [_deflection(mech, shaft, at, acceleration) for shaft in mech.bristles]
     memory = [_first_memory(mech, at, name) for name in mech.memory_names]
@@ -31,7 +31,7 @@ def start_state(mech: Mechanism, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         pick(v, mech.free_groups),
         column(deflections),
         at.extra,
-        lagged,
+        following,
         ca.SX.zeros(len(mech.loop_names)),
         column([warm_up.risen(mech.inputs[TIME]) for warm_up in mech.warming.values()]),
         column(memory),

@@ -19,9 +19,9 @@ from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, losses, transmitted_torque
 from friction_ocp.drive.mechanism import Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import (
-    commands,
     cut,
     extra_rates,
+    followers,
     follows_smooth_command,
     motor_current,
     motor_torque,
@@ -33,7 +33,6 @@ from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.drive.start import start_state
 from friction_ocp.drive.torques import loops_after
 from friction_ocp.drive.units import DRIVE_TORQUE
-from friction_ocp.friction.smoothing import expm1, tanh, where
 from friction_ocp.kept import kept
 from friction_ocp.parameters import is_off
 
@@ -41,9 +40,6 @@ INSTANT = 1e-2
 """Share of a step over which an acceleration is taken: nearly its value at the node, yet blunt near standstill."""
 
 NOTHING_HELD: Mapping[int, Any] = {}
-
-NO_LAG = 1.0 / 40.0
-"""Share of a step below which a lag has decayed within it to less than the rounding of doubles."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +78,14 @@ class State:
     speeds: ca.SX
     bristle: ca.SX
     extra: ca.SX
-    lagged: ca.SX
+    following: ca.SX
     loops: ca.SX
     warmth: ca.SX
     memory: ca.SX
 
     def at(self, q: ca.SX, v: ca.SX) -> Motion:
         """Return the motion at an instant, the groups being at `q` with speeds `v`."""
-        return Motion(q, v, self.extra, self.memory, self.lagged, self.loops, self.warmth)
+        return Motion(q, v, self.extra, self.memory, self.following, self.loops, self.warmth)
 
     def motion(self, mech: Mechanism) -> Motion:
         """Return the motion of a drive in this state."""
@@ -103,7 +99,7 @@ def state_symbols(mech: Mechanism) -> State:
         len(mech.free_groups),
         len(mech.bristle_names),
         len(mech.extra_names),
-        len(mech.lagging),
+        len(mech.following_names),
         len(mech.loop_names),
         len(mech.warming),
         len(mech.memory_names),
@@ -115,7 +111,7 @@ def state_symbols(mech: Mechanism) -> State:
 def _passes(mech: Mechanism) -> int:
     """One pass suffices where nothing but the own speed couples into the speed update."""
     controller = mech.drive.controller
-    loop = bool(mech.lagging) and controller is not None and controller.sample_time is None
+    loop = bool(mech.following) and controller is not None and controller.sample_time is None
     varying = any(mech.has_varying_ratios(group) for group in range(len(mech.topology.roots)))
     coupled = mech.topology.elastic or mech.bristles or mech.extra_names or mech.warming
     return 2 if coupled or loop or varying else 1
@@ -148,8 +144,8 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
     bristle = mech.deflections(state.bristle)
     v1, load = v0, dict[str, Any]()
     at: Motion = replace(state.at(group_angles(mech, free_angles), v0), h=h, steady=v0)
-    lagged_mean, lagged_after = _advance_lags(mech, state, at)
-    extra_after, warmth_after, at = state.extra, state.warmth, replace(at, lagged=lagged_mean)
+    following_mean, following_after = _advance_following(mech, state, at)
+    extra_after, warmth_after, at = state.extra, state.warmth, replace(at, following=following_mean)
     unknowns: list[Unknown] = []
     for _ in range(_passes(mech)):
         # torques at the middle angle shifted by h^2 / 12 of the acceleration have the mean of the step
@@ -162,15 +158,15 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
         at = replace(at, v=done.mean, steady=done.mean)
         extra_after = _advance_extra(mech, state, replace(at, extra=state.extra), h)
         warmth_after = _advance_warmth(mech, state, at, load)
-        lagged_mean, lagged_after = _advance_lags(mech, state, at)
+        following_mean, following_after = _advance_following(mech, state, at)
         warmth_mean = 0.5 * (state.warmth + warmth_after)
-        at = replace(at, extra=0.5 * (state.extra + extra_after), lagged=lagged_mean, warmth=warmth_mean)
+        at = replace(at, extra=0.5 * (state.extra + extra_after), following=following_mean, warmth=warmth_mean)
     value = ca.vertcat(
         state.angles + h * pick(at.v, mech.angle_groups),
         pick(v1, mech.free_groups),
         _advance_bristles(mech, state, at, load),
         extra_after,
-        lagged_after,
+        following_after,
         loops_after(mech, at),
         warmth_after,
         state.memory,
@@ -178,16 +174,13 @@ def _advance(mech: Mechanism, state: State, h: ca.SX, width: ca.SX) -> _Expressi
     return _Expression(value, tuple(unknowns))
 
 
-def _advance_lags(mech: Mechanism, state: State, at: Motion) -> tuple[ca.SX, ca.SX]:
-    """Return mean and end of what follows commands late, exact under a command that is constant over the step."""
-    if not mech.lagging:
-        return state.lagged, state.lagged
-    wanted = commands(mech, at)
-    share = column([motor.lag for motor in mech.lagging]) / at.h
-    slow = share > NO_LAG
-    gone = -expm1(-1.0 / where(slow, share, 1.0))
-    behind = state.lagged - wanted
-    return wanted + where(slow, share * gone, share) * behind, wanted + where(slow, 1.0 - gone, 0.0) * behind
+def _advance_following(mech: Mechanism, state: State, at: Motion) -> tuple[ca.SX, ca.SX]:
+    """Return mean and end of what follows commands late, these being constant over the step."""
+    means, ends = list[Any](), list[Any]()
+    for item, wanted in followers(mech, replace(at, following=state.following)):
+        mean, end = item.stepped(wanted, at.h)
+        means, ends = [*means, *mean], [*ends, *end]
+    return column(means), column(ends)
 
 
 def _advance_extra(mech: Mechanism, state: State, at: Motion, h: ca.SX) -> ca.SX:
@@ -218,7 +211,7 @@ def _advance_warmth(mech: Mechanism, state: State, at: Motion, load: dict[str, A
 
 def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX, late: Collection[str]) -> _Expression:
     q, v = group_angles(mech, state.angles), group_speeds(mech, state.speeds)
-    at = _observed_lags(mech, state.at(q, v), h)
+    at = _observed_following(mech, state.at(q, v), h)
     bristle = mech.deflections(state.bristle)
     instant = INSTANT * h
     done = implicit_kick(mech, Step(instant, v, at, bristle, width))
@@ -240,22 +233,14 @@ def _outputs(mech: Mechanism, state: State, h: ca.SX, width: ca.SX, late: Collec
     return _Expression(value, () if done.unknown is None else (done.unknown,))
 
 
-def _observed_lags(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
-    """Return the motion at a node with lags as they are there.
-
-    Commands are constant over a step, at their values in its middle, so that what follows a ramp comes out
-    h / 2 coth(h / (2 lag)) behind it at the nodes instead of the lag. Commands that are held are exact as they are.
-    """
-    smooth: list[Any] = [float(follows_smooth_command(mech, motor)) for motor in mech.lagging]
-    if not any(smooth):
-        return at
-    assert at.lagged is not None
-    wanted = commands(mech, at)
-    share = column([motor.lag for motor in mech.lagging]) / h
-    slow = share > NO_LAG
-    seen = 2.0 * share * where(slow, tanh(0.5 / where(slow, share, 1.0)), 1.0)
-    behind = where(column(smooth) > 0, seen, 1.0)
-    return replace(at, lagged=wanted + behind * (at.lagged - wanted))
+def _observed_following(mech: Mechanism, at: Motion, h: ca.SX) -> Motion:
+    """Return the motion at a node with what follows commands as it is there; under held ones it is exact as it is."""
+    late = zip(mech.following, followers(mech, at), strict=True)
+    seen = (
+        item.observed(wanted, h) if follows_smooth_command(mech, motor) else item.states
+        for motor, (item, wanted) in late
+    )
+    return replace(at, following=column([one for states in seen for one in states]))
 
 
 def no_rate(value: Any) -> Any:
@@ -319,7 +304,7 @@ def _tick(mech: Mechanism, state: State, kind: ca.SX) -> ca.SX:
     memory = {name: state.memory[k] for k, name in enumerate(mech.memory_names)}
     computed, applied = compute_tick(controller, seen_by_controller(mech, at), memory), apply_tick(controller, memory)
     chosen = [ca.if_else(kind < 1.5, computed[name], applied[name]) for name in mech.memory_names]
-    kept = (state.angles, state.speeds, state.bristle, state.extra, state.lagged, state.loops, state.warmth)
+    kept = (state.angles, state.speeds, state.bristle, state.extra, state.following, state.loops, state.warmth)
     return ca.vertcat(*kept, column(chosen))
 
 
@@ -333,7 +318,7 @@ def stepped(drive: Drive) -> SteppedDrive:
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
     y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
-    dead = any(not is_off(motor.dead_time) for motor in drive.motors)
+    dead = drive.late_as_a_whole and any(not is_off(motor.dead_time) for motor in drive.motors)
     late = {channel.name for channel in drive.outputs if dead or channel.delay != 0.0 or channel.clock}
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width, late)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None

@@ -18,8 +18,12 @@ def _motors(drive: Drive) -> list[Motor]:
 
 def _shows_dead_time(drive: Drive) -> bool:
     """Whether a command that is acted on late is more than a late sensor: it makes several late by the same time."""
-    alone = len(drive.motors) == 1 and drive.controller is None
-    return alone and is_off(drive.motors[0].dead_time) and len(drive.outputs) > 1
+    return drive.late_as_a_whole and is_off(drive.motors[0].dead_time) and len(drive.outputs) > 1
+
+
+def _step(clues: Clues) -> float:
+    """Return the usual time between samples, s."""
+    return float(np.median(np.diff(clues.tracks[0].time)))
 
 
 def _shows_current(drive: Drive, motor: Motor) -> bool:
@@ -41,7 +45,7 @@ class DriveLagEffect(AbstractEffect):
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         motor = motor_of(drive, place)
         assert motor is not None
-        step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{motor.name}.lag"
+        step, path = _step(clues), f"{motor.name}.lag"
         times = [step, 5.0 * step, 25.0 * step]
         lag = Free(times[0], 1e-3 * step, 1e3 * step)
         if _shows_current(drive, motor):
@@ -55,6 +59,15 @@ class DriveLagEffect(AbstractEffect):
         dead = f"{motor.name}.dead_time"
         added = change_motor(drive, motor.name, lag=lag, dead_time=Free(0.1 * step, 0.0, 100.0 * step))
         return Augmentation(added, {path: 0.0, dead: 0.0}, tuple(Trial(({path: one}, {dead: step})) for one in times))
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        """Return the drive whose motor begins to follow after a dead time, where a loop or other motors feel it."""
+        motor = motor_of(drive, place)
+        if motor is None or is_off(motor.lag) or not is_off(motor.dead_time) or drive.late_as_a_whole:
+            return None
+        step, path = _step(clues), f"{motor.name}.dead_time"
+        added = change_motor(drive, motor.name, dead_time=Free(0.1 * step, 0.0, 100.0 * step))
+        return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in (step, 5.0 * step)))
 
 
 class TorqueSaturationEffect(AbstractEffect):

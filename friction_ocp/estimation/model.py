@@ -360,9 +360,10 @@ def _typical(use: RecordingUse, name: str) -> float:
 def _rates(drive: SteppedDrive, numbers: FloatArray, inputs: list[float]) -> ComplexArray:
     """Return the eigenvalues, 1/s, of the motion about standstill without dry friction.
 
-    What follows a command late is left out: the step is exact in it, however short its time constant.
+    What follows a command late is left out: the step is exact in it, however short its times.
     """
-    kept = [k for k, name in enumerate(drive.state_names) if not name.endswith(".lagged")]
+    late = drive.mechanism.following_names
+    kept = [k for k, name in enumerate(drive.state_names) if name not in late]
     (slope,) = slopes_at(drive, numbers, inputs, [np.zeros(len(drive.state_names))])
     return np.linalg.eigvals(slope[np.ix_(kept, kept)]).astype(complex)
 

@@ -51,7 +51,7 @@ class MuJoCoRun:
         self._functions = _functions(self._mech)
         self._address = [int(self._model.joint(joint.name).qposadr[0]) for joint in drive.joints]
         self._dof = [int(self._model.joint(joint.name).dofadr[0]) for joint in drive.joints]
-        self._own = bool(self._mech.extra_names or self._mech.lagging or self._mech.memory_names)
+        self._own = bool(self._mech.extra_names or self._mech.following or self._mech.memory_names)
 
     def _loaded(self, fitted: Fitted, text: str) -> Any:
         try:
@@ -116,9 +116,8 @@ class MuJoCoRun:
         for k, joint in enumerate(self._drive.joints):
             data.qpos[self._address[k]] = x[joint.group] * joint.speed
             data.qvel[self._dof[k]] = x[groups + joint.group] * joint.speed
-        if not self._by_torque and self._mech.lagging:
-            first = self._mech.state_names.index(f"{self._mech.lagging[0].name}.lagged")
-            data.act[:] = x[first : first + len(data.act)]
+        if not self._by_torque:
+            data.act[:] = x[[name.endswith(".lagged") for name in self._mech.state_names]]
 
     def _take(self, data: Any, x: FloatArray) -> None:
         """Take angles and speeds from MuJoCo into a state."""

@@ -27,13 +27,13 @@ CHANNELS: dict[str, dict[str, Any]] = {
 }
 
 
-def looped(unbalance: float, feedback: str, lag: float, shown: str) -> Plant:
+def looped(unbalance: float, feedback: str, lag: float, shown: str, dead_time: float = 0.0) -> Plant:
     """Return the axis under a speed loop that sees its tachometer with the noise that is logged, or without any.
 
-    Its motor lags by `lag` s, and what is logged of it is `shown`, the command or the current.
+    Its motor lags by `lag` s after `dead_time` s, and what is logged of it is `shown`, the command or the current.
     """
     plain = axis()
-    amplifier = PlantAmplifier(time_constant=lag) if lag else None
+    amplifier = PlantAmplifier(delay=dead_time, time_constant=lag) if lag else None
     return replace(
         plain,
         shafts=(replace(plain.shafts[0], gravity=(unbalance, 0.3)),),
@@ -55,6 +55,7 @@ def written(
     lag: float = 0.0,
     shown: str = "current",
     effects: Sequence[str] = ("unbalance", "stribeck", "sensor_delay"),
+    dead_time: float = 0.0,
 ) -> Path:
     """Write three recordings and a problem whose model is right but for the unbalance and the lag."""
     path, time = write_case(folder, axis(), effects=list(effects)), np.arange(0, SECONDS, STEP)
@@ -62,7 +63,7 @@ def written(
         rng = np.random.default_rng(20 + k)
         steps = reversing_steps(np.array([2.0, 6.0, 15.0]), (0.2, 0.6), SECONDS, rng)
         wanted = np.interp(time, np.asarray(steps.time), np.asarray(steps.value))
-        run = looped(unbalance, feedback, lag, shown).simulate(
+        run = looped(unbalance, feedback, lag, shown, dead_time).simulate(
             SECONDS, {"reference.omega": Trajectory(time, wanted, "zero")}, rng
         )
         found = {key: Channel(key, *run.channels[key], UNITS[key]) for key in UNITS if key in run.channels}

@@ -14,7 +14,6 @@ from plant import Plant, PlantAmplifier, PlantSensor, Trajectory, steps_and_mult
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis.worth import innovations
-from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import late_of, prepare
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -45,7 +44,6 @@ def write(folder: Path, **motor: object) -> Path:
         current = Trajectory(time, np.interp(time, np.asarray(steps.time), np.asarray(steps.value)), "zero")
         run = plant.simulate(SECONDS, {"motor.current": current}, rng)
         channels = {key: Channel(key, *run.channels[key], unit) for key, unit in UNITS.items()}
-        channels["wanted"] = replace(channels["speed"], name="wanted")
         write_recording(Recording(name, channels), folder / f"{name}.h5")
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
     document["channels"]["speed"] = {"measures": "motor.omega", "noise_std": 0.05}
@@ -70,15 +68,3 @@ def test_a_motor_that_is_stated_late_is_late_in_the_simulation(tmp_path: Path) -
     assert fitted.values["motor.inertia"] == pytest.approx(INERTIA, rel=1e-3)
     for late in late_of(fitted.model).values():
         assert late == pytest.approx({"position": 4 * STEP, "speed": 4 * STEP})
-
-
-def test_behind_a_controller_the_delay_is_the_controllers(tmp_path: Path) -> None:
-    """A loop that is simulated feels the dead time, which late outputs would not show it."""
-    path = write(tmp_path, dead_time=DEAD)
-    document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    document["channels"]["current"] = {"measures": "motor.current"}
-    document["channels"]["wanted"] = {"measures": "reference.omega", "role": "input"}
-    document["controller"] = {"type": "pi_velocity", "feedback": "speed", "kp": 1.0, "output": "current"}
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    with pytest.raises(FrictionOcpError, match="dead time of a motor behind a simulated controller"):
-        load_problem(path)

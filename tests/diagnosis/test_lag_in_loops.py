@@ -8,7 +8,7 @@ import pytest
 from diagnosis_cases import STEP, diagnosed
 from looped_axis import written
 
-LAG = 3.0 * STEP
+LAG, DEAD = 3.0 * STEP, 2.5 * STEP
 
 
 @pytest.mark.parametrize(("shown", "hidden"), [("command", 1.0), ("current", 0.0)])
@@ -20,3 +20,16 @@ def test_the_lag_is_found_whichever_is_logged(tmp_path: Path, shown: str, hidden
     assert (accepted["effect"], accepted["component"]) == ("drive_lag", "motor")
     assert accepted["parameters"]["motor.lag"]["value"] == pytest.approx(LAG, rel=0.05)
     assert accepted["parameters"]["motor.lag_hidden"]["value"] == pytest.approx(hidden, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shown", ["command", "current"])
+def test_a_dead_time_before_the_lag_is_the_motors(tmp_path: Path, shown: str) -> None:
+    """What begins late to follow is the motor's, in its more general shape, and no late sensor beside it."""
+    effects = ("drive_lag", "sensor_delay", "stribeck")
+    result = diagnosed(written(tmp_path, feedback="quiet", lag=LAG, shown=shown, effects=effects, dead_time=DEAD))
+    (accepted,) = result["accepted"]
+    assert (accepted["effect"], accepted["component"], result["verdict"]) == ("drive_lag", "motor", "explained")
+    found = {name: item["value"] for name, item in accepted["parameters"].items()}
+    assert found["motor.lag"] == pytest.approx(LAG, rel=0.1)
+    assert found["motor.dead_time"] == pytest.approx(DEAD, rel=0.1)

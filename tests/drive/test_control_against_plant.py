@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant import Plant, PlantAmplifier, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 from twin import Bench, Run, Twin, worst
 
+from friction_ocp.drive.following import DELAYED
 from friction_ocp.drive.parts import Channel, Controller, Drive, Motor, Shaft
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.static import CoulombViscous
@@ -103,6 +106,25 @@ def test_a_current_is_shown_behind_the_lag_or_before_it(shown: str) -> None:
     first = float(twin.run(0.01)[0]["shown"][0])
     truth, run = twin.run(2.0, {"drive.lagged": first})
     assert worst(truth, run, "axis.theta", "axis.omega", "shown") < STEP_ERROR
+
+
+def test_a_sampled_loop_feels_the_dead_time_of_its_motor() -> None:
+    """Commands that are acted on 1.5 periods late, then with a lag: within what steps of a command make of it."""
+    late, expansion = PlantAmplifier(delay=3e-3, time_constant=5e-3), 2e-3
+    controller = PlantController(type="cascade", kp=5.0, kd=0.1, ki=2.0, **SLOW, **LOOP)
+    motor = PlantMotor("drive", "axis", torque_constant=0.5, controller="loop", amplifier=late)
+    shaft = PlantShaft("axis", 0.01, PlantFriction("coulomb_viscous", tau_c=0.05, viscous=0.01))
+    sensors = (PlantSensor("seen", "axis.theta", controller.sample_time), PlantSensor("current", "drive.current"))
+    plant = Plant((shaft,), (), (motor,), (controller,), sensors)
+    twin = Twin(plant, {"reference.theta": ANGLE, "reference.omega": SPEED})
+    first = float(twin.run(0.01)[0]["current"][0])
+    begin = {f"drive.{name}": first for name in (*DELAYED, "lagged")}
+    truth, ours = twin.run(2.0, begin)
+    amplifier = PlantAmplifier(time_constant=late.time_constant)
+    prompt = replace(plant, motors=(replace(motor, amplifier=amplifier),))
+    _, punctual = Twin(prompt, {"reference.theta": ANGLE, "reference.omega": SPEED}).run(2.0, begin)
+    for name in ("axis.theta", "axis.omega"):
+        assert worst(truth, ours, name) < expansion < 0.1 * worst(truth, punctual, name)
 
 
 def servo(controller: Controller, motor: Motor) -> Bench:

@@ -172,6 +172,7 @@ def _motor(motor: PlantMotor, sensors: Sequence[PlantSensor]) -> Motor:
         0.0 if saturation is None else saturation.current**-2.0 * (2.0 / 3.0 if cubic else 1.0),
         2.0 if saturation is None or cubic else saturation.sharpness,
         -1.0 if cubic else None,
+        dead_time=0.0 if motor.amplifier is None or not motor.controller else motor.amplifier.delay,
         lag_hidden=float(any(item.measures == f"{motor.name}.command" for item in sensors)),
     )
 
@@ -310,7 +311,7 @@ class Twin:
     ) -> tuple[Run, Run]:
         """Return the plant's truth and the free run of the drive, both every 1 ms from the same start."""
         initial = self._commanded() | dict(initial or {})
-        ours_alone = ("controller.", ".lagged")
+        ours_alone = ("controller.", ".lagged", ".delayed")
         first = {name: value for name, value in initial.items() if not any(part in name for part in ours_alone)}
         done = self.plant.simulate(duration, self.inputs, initial=first, truth_rate=1000, step=PLANT_STEP)
         recorded = {name: np.interp(done.truth["time"], *channel) for name, channel in done.channels.items()}

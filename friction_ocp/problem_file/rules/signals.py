@@ -10,7 +10,6 @@ from friction_ocp.drive.topology import topology
 from friction_ocp.drive.units import DRIVE_TORQUE, MOTOR_SIGNALS, REFERENCE_SIGNALS, SHAFT_SIGNALS
 from friction_ocp.errors import Finding
 from friction_ocp.expressions import closest
-from friction_ocp.parameters import is_off
 from friction_ocp.problem_file.rules.case import Case, Rule
 
 DRIVING_SIGNALS = ("torque", "current", "voltage")
@@ -253,18 +252,6 @@ def delay_needs_a_sample_time(case: Case) -> Iterator[Finding]:
         yield Finding(case.at("controller.delay"), what, remedy="state sample_time")
 
 
-def dead_time_is_that_of_the_whole_drive(case: Case) -> Iterator[Finding]:
-    """What a command is late by is what all outputs are late by, as long as nothing else moves or closes a loop."""
-    for motor in case.drive.motors:
-        if is_off(motor.dead_time):
-            continue
-        where = case.at(f"drive.{motor.name}.dead_time")
-        if case.drive.controller is not None:
-            yield Finding(where, "dead time of a motor behind a simulated controller", "delay of the controller")
-        elif len(case.drive.motors) > 1:
-            yield Finding(where, "dead time of one of several motors", "a drive with one motor")
-
-
 def process_noise_acts_on_shafts(case: Case) -> Iterator[Finding]:
     """Process noise is a torque on a shaft that exists."""
     names = [shaft.name for shaft in case.drive.shafts]
@@ -289,7 +276,6 @@ SIGNALS: tuple[Rule, ...] = (
     clocks_exist,
     clocks_of_inputs_are_known,
     delay_needs_a_sample_time,
-    dead_time_is_that_of_the_whole_drive,
     process_noise_acts_on_shafts,
 )
 WHOLE: tuple[Rule, ...] = (
