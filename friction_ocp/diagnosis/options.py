@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.stated_keys import stated_keys
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import candidates, effects
@@ -145,6 +146,7 @@ def _entries(problem: Problem, key: str, stated: object, findings: list[Finding]
             findings.append(Finding(where, f"unknown effect {effect!r}", available, remedy))
             continue
         known = {place: None for drive in drives for place in catalogue[effect].places(drive)}
+        known |= {place: None for name, place in stated_keys(problem.drive) if name == effect}
         if at and component not in known:
             expected = f"one of {', '.join(known)}" if known else "an effect that this drive can have"
             findings.append(Finding(where, f"{effect} makes no sense at {component!r} of this drive", expected))

@@ -18,6 +18,7 @@ from friction_ocp.diagnosis.refit import completed, quick_refit
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz
+from friction_ocp.diagnosis.stated_keys import stated_key
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
@@ -32,7 +33,6 @@ CONTRADICTED = 3.0
 """Prior deviations between stated and fitted value beyond which the stated one is wrong."""
 STATED = ("inertia_error", "parameter_error")
 """Effects that take back values which a problem states as fixed."""
-_SENSOR = {"gain": "sensor_gain", "offset": "sensor_offset", "delay": "sensor_delay"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def contradictions(fitted: FittedModel) -> list[Contradiction]:
     found: dict[Key, Contradiction] = {}
     for k in np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED)):
         name, far = space.names[k], float(distance[k])
-        key = _key(name.partition("@")[0], drive)
+        key = stated_key(name.partition("@")[0], drive)
         known = found.get(key, Contradiction(*key, (), 0.0))
         found[key] = replace(known, names=(*known.names, name), deviations=max(known.deviations, far))
     return sorted(found.values(), key=lambda item: -item.deviations)
@@ -101,14 +101,6 @@ def _lightened(fitted: FittedModel, shaft: str) -> float:
     k = space.names.index(name)
     stated = space.prior_mean[k] if np.isfinite(space.prior_std[k]) else space.upper[k]
     return float(stated - fitted.theta[k])
-
-
-def _key(path: str, drive: Drive) -> Key:
-    """Return effect and component of a parameter that is not as stated."""
-    part, _, rest = path.partition(".")
-    if any(item.name == part for item in drive.channels):
-        return _SENSOR.get(rest, "parameter_error"), part
-    return ("inertia_error" if rest == "inertia" else "parameter_error"), part
 
 
 def corrected(current: FittedModel, found: Sequence[Contradiction], meant: Considered) -> Choice | None:

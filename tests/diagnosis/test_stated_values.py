@@ -43,6 +43,17 @@ def test_an_inertia_beyond_three_deviations_of_its_prior_is_named(
     assert {"stribeck", "sensor_delay"} <= {cause["effect"] for cause in only["causes"]}
 
 
+def test_a_stated_value_may_be_named_as_a_diagnosis_names_it(tmp_path: Path) -> None:
+    """An entry of `effects` is what an earlier diagnosis found: an inertia that is fitted about a wrong prior."""
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    stated = {"guess": 1.4 * INERTIA, "prior_std": 0.07 * INERTIA, "min": 1e-4, "max": 0.1}
+    document["drive"]["shafts"][0]["inertia"] = stated
+    document["diagnosis"]["effects"] = ["inertia_error at motor"]
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    assert diagnose(load_problem(path)).accepted == (("inertia_error", "motor"),)
+
+
 def test_only_named_stated_values_are_taken_back(tmp_path: Path) -> None:
     """Where a problem names which stated values compete, a contradicted inertia that is none of them stays."""
     path = write_case(tmp_path, axis())
