@@ -24,10 +24,11 @@ from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
-from friction_ocp.diagnosis.stated import STATED, contradictions, corrected
+from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import Key
+from friction_ocp.effects.stated_values import STATED
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.statistics.execution import Execution

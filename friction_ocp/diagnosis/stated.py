@@ -24,6 +24,7 @@ from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import bind_drive, drive_leaves
 from friction_ocp.effects.effect import Augmentation, Key
 from friction_ocp.effects.registry import effects
+from friction_ocp.effects.stated_values import STATED
 from friction_ocp.effects.torques import mode_of
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.parameters import Free
@@ -31,8 +32,6 @@ from friction_ocp.simulation.grid import FloatArray
 
 CONTRADICTED = 3.0
 """Prior deviations between stated and fitted value beyond which the stated one is wrong."""
-STATED = ("inertia_error", "parameter_error")
-"""Effects that take back values which a problem states as fixed."""
 
 
 @dataclass(frozen=True)

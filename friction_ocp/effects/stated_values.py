@@ -84,3 +84,7 @@ def _numbers(fixed: dict[str, float], part: str, keys: tuple[str, ...]) -> list[
     stems = tuple(f"{part}.{key}" for key in keys)
     shapes = (".delta", ".omega_zero", ".phase", ".period", ".other_period", ".reference_temperature")
     return [path for path in fixed if path.startswith(stems) and not path.endswith(shapes)]
+
+
+STATED = (InertiaErrorEffect.name, ParameterErrorEffect.name)
+"""Effects that take back values which a problem states."""

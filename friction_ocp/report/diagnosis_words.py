@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from friction_ocp.effects.stated_values import STATED
 from friction_ocp.plots.numbers import is_number, percent, significant, to_resolution, unit_text, whole_percent
 from friction_ocp.plots.reading import Json, part, rows
 
@@ -20,6 +21,10 @@ def diagnosis_sentence(result: Json) -> str:
     match str(result.get("verdict")):
         case "no_gap":
             return "The model explains these recordings down to the noise: there is no gap to close."
+        case "explained" | "undecided" as verdict if _but_for_stated_values(result):
+            likely = "most likely " if verdict == "undecided" else ""
+            known = "The model explains these recordings down to the noise, but not with the values that are stated"
+            return f"{known}: {likely}{_listed(accepted)}."
         case "explained":
             return f"The model lacked {_listed(accepted)}; with it {_closed(closed)}.{_stray(result)}"
         case "undecided":
@@ -41,6 +46,14 @@ def diagnosis_sentence(result: Json) -> str:
         case _:
             told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
             return f"{told}{_cut_short(result)}"
+
+
+def _but_for_stated_values(result: Json) -> bool:
+    """Whether the recordings showed no gap, and no more than stated values were found to be wrong."""
+    if any(item["effect"] not in STATED for item in rows(result, "accepted")):
+        return False
+    shown = any(part(item, "excess")["p_value"] < result["significance"] for item in rows(result, "rounds"))
+    return not shown and float(part(part(result, "gap"), "shrink")["interval95"][0]) <= 0.0
 
 
 def _lost(result: Json) -> bool:

@@ -46,6 +46,20 @@ def test_aliases_are_told_as_what_recordings_cannot_tell_apart() -> None:
     assert alias_sentences(undecided) == ["load dependence at servo or cogging at servo"]
 
 
+@pytest.mark.parametrize(("verdict", "likely"), [("explained", ""), ("undecided", "most likely ")])
+def test_values_that_are_not_as_stated_close_no_gap(verdict: str, likely: str) -> None:
+    """Where the recordings showed none, the sentence says what is wrong and no share of it; elsewhere the share."""
+    wrong = {"effect": "inertia_error", "component": "gear", "meaning": "the stated inertia is wrong"}
+    noise, gap = {"excess": {"ratio": 0.9, "p_value": 0.8}}, {"shrink": {"overall": 0.0, "interval95": [-0.1, 0.1]}}
+    said = result(verdict, accepted=[wrong], rounds=[noise], gap=gap, significance=0.01)
+    told = diagnosis_sentence(said)
+    assert told.startswith("The model explains these recordings down to the noise, but not with the values that are")
+    assert told.endswith(f"stated: {likely}inertia error at gear (the stated inertia is wrong).")
+    assert "50 % of the excess" in diagnosis_sentence({**said, "gap": result(verdict)["gap"]})
+    shown = {"excess": {"ratio": 3.0, "p_value": 1e-9}}
+    assert "of the excess" in diagnosis_sentence({**said, "rounds": [shown]})
+
+
 def test_what_recordings_are_too_fast_for_is_told_with_the_speed_to_record() -> None:
     """The effect, the size that would hide, and below which speed to record."""
     spot = {
