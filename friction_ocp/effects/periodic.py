@@ -43,6 +43,8 @@ def wave(stem: str, size: float, periods: list[float]) -> tuple[list[Free], dict
 
 FURTHER = 0.1
 """Size of a trial overtone, or of a wave of another period, over the wave's own."""
+SUBHARMONIC = 2.0
+"""Period over that of a wave that a further one begins with, where nothing of another period is seen to be missing."""
 SAME_PERIOD = 0.1
 """Relative difference up to which a period of what is missing is taken for that of the wave, or of an overtone."""
 
@@ -70,10 +72,7 @@ def _further_size(part: Any, path: str, clues: Clues) -> float:
 
 
 class AbstractWaveEffect(AbstractEffect):
-    """A wave that a part of the drive lacks; once one was accepted, with overtones or a wave of another period.
-
-    Which of both, the strongest period of what is still missing says.
-    """
+    """A wave that a part of the drive lacks; once one was accepted, with overtones and a wave of another period."""
 
     kind: ClassVar[type[Wave]]
 
@@ -95,17 +94,19 @@ class AbstractWaveEffect(AbstractEffect):
         return Augmentation(self.with_wave(drive, place, self.kind(*numbers)), off, trials)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
-        plain, path = self.there(drive, place)
-        if plain is None or plain.has_overtones or plain.has_other:
+        part, path = self.there(drive, place)
+        if part is None or (part.has_overtones and part.has_other):
             return None
-        period = clues.numbers.get(f"{path}.period", start_of(plain.period))
-        known = [period / order for order in (1, 2, 3)]
-        found = self.size_and_periods(drive, place, clues)[1]
-        strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
-        if strange and strange[0] == found[0]:
-            part, off, trials = other_wave(plain, path, clues, strange)
-        else:
-            part, off, trials = overtones(plain, path, clues)
+        off, trials = dict[str, float](), tuple[Trial, ...]()
+        if not part.has_overtones:
+            part, off, trials = overtones(part, path, clues)
+        if not part.has_other:
+            period = clues.numbers.get(f"{path}.period", start_of(part.period))
+            known = [period / order for order in (1, 2, 3)]
+            found = self.size_and_periods(drive, place, clues)[1]
+            strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
+            part, none, further = other_wave(part, path, clues, strange or [SUBHARMONIC * period])
+            off, trials = off | none, trials + further
         return Augmentation(self.with_wave(drive, place, part), off, trials)
 
 

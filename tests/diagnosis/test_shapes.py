@@ -142,16 +142,32 @@ def test_a_shape_begins_as_what_it_was(name: str) -> None:
     assert {state: on[state] for state in plain} != pytest.approx(plain, rel=1e-9)
 
 
-@pytest.mark.parametrize(("period", "also"), [(0.35, "second_cosine"), (0.7, "second_cosine"), (0.43, "other_cosine")])
-def test_what_is_missing_beside_a_wave_says_its_shape(period: float, also: str) -> None:
-    """At half the period of the wave it has overtones, at none of its orders another wave is beside it."""
+@pytest.mark.parametrize("period", [0.35, 0.7, 0.43])
+def test_a_wave_gets_overtones_and_one_of_another_period(period: float) -> None:
+    """What is missing at none of its orders says the other period; there is one to begin with in any case."""
     drive, effect, clues = geared(cogging=Cogging(0.05, 0.08, 0.7)), effects()["cogging"], lacking(period)
     found = effect.reshaped(drive, "motor", clues)
-    assert found is not None and f"drive.cogging.{also}" in found.off
-    if also == "other_cosine":
-        periods = [trial.fixed["drive.cogging.other_period"] for trial in found.trials]
-        assert periods[0] == pytest.approx(period, rel=0.01)
+    assert found is not None
+    parts = ("second_cosine", "second_sine", "third_cosine", "third_sine", "other_cosine", "other_sine")
+    assert set(found.off) == {f"drive.cogging.{part}" for part in parts}
+    overtones, *others = found.trials
+    periods = [trial.fixed["drive.cogging.other_period"] for trial in others]
+    assert not overtones.fixed and all(abs(each / 0.7 * order - 1.0) > 0.1 for each in periods for order in (1, 2, 3))
+    assert period != 0.43 or periods[0] == pytest.approx(period, rel=0.01)
     assert effect.reshaped(found.drive, "motor", lacking(0.35)) is None
+
+
+@pytest.mark.parametrize(
+    ("known", "added"),
+    [({"second_cosine": 0.01}, "other"), ({"other_cosine": 0.01, "other_sine": 0.0, "other_period": 0.3}, "second")],
+)
+def test_a_wave_gets_what_it_does_not_have_yet(known: dict[str, float], added: str) -> None:
+    """A wave that a problem states with overtones gets one of another period alone, and the other way round."""
+    drive, effect = geared(cogging=Cogging(0.05, 0.08, 0.7, **known)), effects()["cogging"]
+    found = effect.reshaped(drive, "motor", lacking(0.43))
+    assert found is not None and f"drive.cogging.{added}_cosine" in found.off
+    assert not any(path.rpartition(".")[2] in known for path in found.off)
+    assert effect.reshaped(found.drive, "motor", lacking(0.43)) is None
 
 
 def test_overtones_start_small_beside_a_wave_that_is_not_fitted_yet() -> None:
