@@ -14,7 +14,7 @@ Found = list[tuple[str, str]]
 MISSED: dict[str, tuple[int, int, Found]] = {
     "free runs are lost, and see nothing of either of two effects; predictions see the first": (
         *(11, 150),
-        [("sensor_eccentricity", "motor_position"), ("torque_ripple", "motor")],
+        [("torque_ripple", "motor"), ("sensor_eccentricity", "motor_position")],
     ),
     "drag that grows with the load, of which the catalogue's first shape explains most, and not for certain": (
         *(20261207, 138),
@@ -28,17 +28,19 @@ MISSED: dict[str, tuple[int, int, Found]] = {
     "cogging once a turn, of which unbalance is all but the overtones": (20261209, 39, [("cogging", "motor")]),
     "unbalance, which cogging of a free period explains as well": (20261207, 136, [("unbalance", "motor")]),
     "the back-EMF of a motor that saturates falls with its torque": (20261207, 158, [("torque_saturation", "motor")]),
+    "overtones of a disturbance in time, where the strongest period of what is missing is none of its orders": (
+        *(20261209, 121),
+        [("periodic_disturbance", "motor")],
+    ),
+    "a dead time before the lag of a motor, in a loop: a late sensor stood in for it": (
+        *(20261209, 148),
+        [("drive_lag", "motor")],
+    ),
 }
 
 
-AGAIN = pytest.mark.xfail(reason="overtones of its ripple are not certain to help: 1.3 times the noise is left")
-"""What is missed again."""
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "why", [pytest.param(why, marks=AGAIN if MISSED[why][:2] == (11, 150) else ()) for why in MISSED]
-)
+@pytest.mark.parametrize("why", MISSED)
 def test_what_was_missed_once_is_found(why: str, tmp_path: Path) -> None:
     """All of it, nothing else, and no more than noise is left."""
     seed, index, expected = MISSED[why]
