@@ -109,7 +109,8 @@ def _drift(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FloatArray:
     if not any(foot.density.values()):
         return np.zeros(model.noise.size)
     length = float(np.mean([run.time[-1] - run.time[0] for run in runs]))
-    return within(model, foot, model.train[0], length if span is None else min(span, length)) / model.noise**2
+    with np.errstate(over="ignore"):  # what is unstable outgrows all numbers
+        return within(model, foot, model.train[0], length if span is None else min(span, length)) / model.noise**2
 
 
 @dataclass(frozen=True)

@@ -46,9 +46,10 @@ def _gathered(slopes: FloatArray, power: FloatArray, spans: FloatArray) -> Float
         term = (along @ term + term @ np.swapaxes(along, 1, 2)) / (k + 1)
         power_of = power_of @ along / k
         found, carried = found + term, carried + power_of
-    for _ in range(doublings):
-        found = found + carried @ found @ np.swapaxes(carried, 1, 2)
-        carried = carried @ carried
+    with np.errstate(over="ignore", invalid="ignore"):  # over long spans what is unstable outgrows all numbers
+        for _ in range(doublings):
+            found = found + carried @ found @ np.swapaxes(carried, 1, 2)
+            carried = carried @ carried
     return 0.5 * (found + np.swapaxes(found, 2, 3))
 
 

@@ -338,7 +338,9 @@ class Program:
         blocks: list[Blocks] = []
         starts = self.measured_starts(point.theta)
         for index, (result, score) in enumerate(self._scored(point, starts, True, by_theta)):
-            part = self._linearise_recording(index, point, (result, score), starts[index][1], by_theta)
+            # derivatives outgrow all numbers where a simulation breaks down; the objective there is infinite
+            with np.errstate(over="ignore", invalid="ignore"):
+                part = self._linearise_recording(index, point, (result, score), starts[index][1], by_theta)
             cost, curvature, slope, block = part
             total += cost
             hessian += curvature
