@@ -136,7 +136,7 @@ def _entries(problem: Problem, key: str, stated: object, findings: list[Finding]
         findings.append(Finding(where, f"this is {stated!r}", "a list of effects"))
         return []
     catalogue, found = effects(), list[tuple[str, str | None]]()
-    drives = (problem.drive, released(problem.drive))
+    drives, from_values = (problem.drive, released(problem.drive)), stated_keys(problem.drive)
     for entry in map(str, cast(list[Any], stated)):
         effect, at, component = entry.partition(AT)
         if effect not in catalogue:
@@ -146,7 +146,7 @@ def _entries(problem: Problem, key: str, stated: object, findings: list[Finding]
             findings.append(Finding(where, f"unknown effect {effect!r}", available, remedy))
             continue
         known = {place: None for drive in drives for place in catalogue[effect].places(drive)}
-        known |= {place: None for name, place in stated_keys(problem.drive) if name == effect}
+        known |= {place: None for name, place in from_values if name == effect}
         if at and component not in known:
             expected = f"one of {', '.join(known)}" if known else "an effect that this drive can have"
             findings.append(Finding(where, f"{effect} makes no sense at {component!r} of this drive", expected))

@@ -19,8 +19,6 @@ GONE = 1.0 / 40.0
 """Share of a step below which what follows has settled within it to less than the rounding of doubles."""
 ORDER = 3
 """Of the approximation of a dead time: of commands that jump, what is left after it is as large for higher ones."""
-
-
 EPSILON = 1e-9
 """Imaginary part of a real pole, over its size."""
 
@@ -49,8 +47,8 @@ class Mode:
 
     def left(self, share: Any) -> Complex:
         """Return the factor on what is left of x over a step of which the dead time is a `share`."""
-        slow = share > GONE
-        passed = 1.0 / where(slow, share, 1.0)
+        slow, safe = _unsettled(share)
+        passed = 1.0 / safe
         decayed, turned = exp(self.pole[0] * passed), self.pole[1] * passed
         return where(slow, decayed * cos(turned), 0.0), where(slow, decayed * sin(turned), 0.0)
 
@@ -58,6 +56,12 @@ class Mode:
         """Return the steps by which x is behind a ramp at the nodes, counted from the middle before."""
         left = self.left(share)
         return _over(left, (1.0 - left[0], -left[1]))
+
+
+def _unsettled(share: Any) -> tuple[Any, Any]:
+    """Return whether what follows is still on its way after a step, and the share, 1 where it is not."""
+    slow = share > GONE
+    return slow, where(slow, share, 1.0)
 
 
 def _times(a: Complex, b: Complex) -> Complex:
@@ -91,7 +95,7 @@ def _modes() -> tuple[Mode, ...]:
 MODES = _modes()
 DELAYED = tuple(f"delayed{k}" for k in range(sum(mode.size for mode in MODES)))
 """States of a dead time."""
-PARTS = {"dead_time": DELAYED, "lag": ("lagged",)}
+STATES = {"dead_time": DELAYED, "lag": ("lagged",)}
 """States of what is late, by what makes it so."""
 
 
@@ -150,8 +154,8 @@ class Follower:
             carried = [known + _times(own, one)[0] for known, one in zip(carried, (x, middle, end), strict=True)]
         if self.lag is not None:
             share, free = self.lag / h, began[-1] - carried[0]
-            slow = share > GONE
-            gone = -expm1(-1.0 / where(slow, share, 1.0))
+            slow, safe = _unsettled(share)
+            gone = -expm1(-1.0 / safe)
             mean.append(carried[1] + where(slow, share * gone, share) * free)
             after.append(carried[2] + where(slow, 1.0 - gone, 0.0) * free)
         return [wanted + one for one in mean], [wanted + one for one in after]
@@ -170,8 +174,8 @@ class Follower:
             whole = self.dead_time / h
         if self.lag is not None:
             share = self.lag / h
-            slow = share > GONE
-            left = where(slow, 0.5 / tanh(0.5 / where(slow, share, 1.0)) - 0.5, 0.0)
+            slow, safe = _unsettled(share)
+            left = where(slow, 0.5 / tanh(0.5 / safe) - 0.5, 0.0)
             late, whole = late + (1.0 - taken) * left, whole + share
             return [*states[:-1], wanted + whole / late * (states[-1] - wanted)]
         return [wanted + whole / late * (one - wanted) for one in states]

@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import has_integral, memory_names
-from friction_ocp.drive.following import PARTS, Follower
+from friction_ocp.drive.following import STATES, Follower
 from friction_ocp.drive.inputs import TIME, input_symbols, moved_from_behind
 from friction_ocp.drive.live_terms import live_terms
 from friction_ocp.drive.loops import Loop
@@ -128,7 +128,7 @@ class Mechanism:
     def following_names(self) -> tuple[str, ...]:
         """Names of the states of what follows commands late."""
         late = ((motor.name, part) for motor in self.following for part in self._lateness(motor))
-        return tuple(f"{name}.{state}" for name, part in late for state in PARTS[part])
+        return tuple(f"{name}.{state}" for name, part in late for state in STATES[part])
 
     def followers(self, states: ca.SX) -> dict[str, Follower]:
         """Return what follows commands late, by motor, in given states."""
@@ -136,7 +136,7 @@ class Mechanism:
         rest = ca.vertsplit(states) if states.numel() else []
         for motor in self.following:
             late = self._lateness(motor)
-            count = sum(len(PARTS[part]) for part in late)
+            count = sum(len(STATES[part]) for part in late)
             found[motor.name] = Follower(late.get("dead_time"), late.get("lag"), tuple(rest[:count]))
             rest = rest[count:]
         return found
@@ -145,7 +145,7 @@ class Mechanism:
         """Return the times that make what drives a motor late, without a dead time that makes all outputs late."""
         if not self.drive.driving_signal(motor):
             return {}
-        dead = None if self.drive.late_as_a_whole else motor.dead_time
+        dead = None if motor in self.drive.delaying else motor.dead_time
         return {name: time for name, time in (("dead_time", dead), ("lag", motor.lag)) if time is not None}
 
     @property

@@ -334,9 +334,9 @@ class Drive:
         return "current" if f"{motor.name}.current_command" in given else None
 
     @property
-    def late_as_a_whole(self) -> bool:
-        """Whether a command that is acted on late makes all outputs as late: nothing else moves or closes a loop."""
-        return self.controller is None and len(self.motors) == 1
+    def delaying(self) -> tuple[Motor, ...]:
+        """The motors whose dead time only makes all outputs as late: one alone, whose command no loop makes."""
+        return self.motors if self.controller is None and len(self.motors) == 1 else ()
 
     @property
     def prescribing(self) -> tuple[Channel, ...]:

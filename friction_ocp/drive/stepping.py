@@ -318,7 +318,7 @@ def stepped(drive: Drive) -> SteppedDrive:
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
     y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
-    dead = drive.late_as_a_whole and any(not is_off(motor.dead_time) for motor in drive.motors)
+    dead = any(not is_off(motor.dead_time) for motor in drive.delaying)
     late = {channel.name for channel in drive.outputs if dead or channel.delay != 0.0 or channel.clock}
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width, late)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None

@@ -18,7 +18,7 @@ def _motors(drive: Drive) -> list[Motor]:
 
 def _shows_dead_time(drive: Drive) -> bool:
     """Whether a command that is acted on late is more than a late sensor: it makes several late by the same time."""
-    return drive.late_as_a_whole and is_off(drive.motors[0].dead_time) and len(drive.outputs) > 1
+    return any(is_off(motor.dead_time) for motor in drive.delaying) and len(drive.outputs) > 1
 
 
 def _step(clues: Clues) -> float:
@@ -63,7 +63,7 @@ class DriveLagEffect(AbstractEffect):
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         """Return the drive whose motor begins to follow after a dead time, where a loop or other motors feel it."""
         motor = motor_of(drive, place)
-        if motor is None or is_off(motor.lag) or not is_off(motor.dead_time) or drive.late_as_a_whole:
+        if motor is None or is_off(motor.lag) or not is_off(motor.dead_time) or motor in drive.delaying:
             return None
         step, path = _step(clues), f"{motor.name}.dead_time"
         added = change_motor(drive, motor.name, dead_time=Free(0.1 * step, 0.0, 100.0 * step))

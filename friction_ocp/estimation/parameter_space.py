@@ -160,7 +160,7 @@ def _table(
     resolved = resolve_ties(ties, table)
     if drive.controller is not None and f"{drive.controller.feedback}.delay" in resolved:
         resolved[FEEDBACK_DELAY] = resolved[f"{drive.controller.feedback}.delay"]
-    for motor in drive.motors if drive.late_as_a_whole else ():
+    for motor in drive.delaying:
         if not is_off(motor.dead_time):  # a command that is acted on later is a drive that is seen later
             dead, resolved[f"{motor.name}.dead_time"] = resolved[f"{motor.name}.dead_time"], 0.0
             for channel in drive.outputs:

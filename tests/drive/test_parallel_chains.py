@@ -21,7 +21,7 @@ from leighton import (
     slow_polyline,
     stop,
 )
-from plant import Plant, PlantFriction, PlantMotor, PlantShaft, PlantTransmission, Trajectory
+from plant import Plant, PlantAmplifier, PlantFriction, PlantMotor, PlantShaft, PlantTransmission, Trajectory
 from twin import Bench, Run, Twin, drive_of, worst
 
 from friction_ocp.drive.parts import Drive
@@ -99,6 +99,23 @@ def test_a_bias_takes_up_the_backlash(bias: float, taken_up: bool) -> None:
     tight, loose = reversal(0.0), reversal(backlash)
     drift = np.ptp((loose - tight)[2000:])
     assert (drift < 0.1 * backlash) == taken_up
+
+
+def test_one_of_two_motors_acts_late() -> None:
+    """Its chain follows 12 ms after its command, with a lag of 5 ms; the other one at once."""
+    plant, late = two_chains(), PlantAmplifier(delay=12e-3, time_constant=5e-3)
+    east, west = plant.motors
+    time = np.linspace(0.0, 2.0, 2001)
+    swings = (2.0 * np.sin(2.0 * np.pi * time), np.sin(6.0 * np.pi * time))
+    inputs = {
+        f"{side}.current": Trajectory(time, swing, "linear")
+        for side, swing in zip(("east", "west"), swings, strict=True)
+    }
+    seen = [f"{shaft.name}.{signal}" for shaft in plant.shafts for signal in ("theta", "omega")]
+    truth, ours = Twin(replace(plant, motors=(east, replace(west, amplifier=late))), inputs).run(2.0)
+    lagging = replace(west, amplifier=replace(late, delay=0.0))
+    _, prompt = Twin(replace(plant, motors=(east, lagging)), inputs).run(2.0)
+    assert worst(truth, ours, *seen) < 1e-4 < 1e-2 * worst(truth, prompt, *seen)
 
 
 def test_the_stepped_drive_follows_the_plant_through_a_stop() -> None:

@@ -22,6 +22,7 @@ from plant import (
     Trajectory,
 )
 
+from friction_ocp.drive.following import DELAYED
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import (
     Channel,
@@ -172,7 +173,7 @@ def _motor(motor: PlantMotor, sensors: Sequence[PlantSensor]) -> Motor:
         0.0 if saturation is None else saturation.current**-2.0 * (2.0 / 3.0 if cubic else 1.0),
         2.0 if saturation is None or cubic else saturation.sharpness,
         -1.0 if cubic else None,
-        dead_time=0.0 if motor.amplifier is None or not motor.controller else motor.amplifier.delay,
+        dead_time=0.0 if motor.amplifier is None else motor.amplifier.delay,
         lag_hidden=float(any(item.measures == f"{motor.name}.command" for item in sensors)),
     )
 
@@ -319,12 +320,12 @@ class Twin:
         return truth, self.bench.run(duration, {**self.inputs, "supply": supply}, self._states(initial), step)
 
     def _commanded(self) -> dict[str, float]:
-        """Return what the motors that lag begin with, as in the plant: their first commands."""
+        """Return what the motors that are late begin with, as in the plant: their first commands."""
         begins: dict[str, float] = {}
         for motor in self.plant.motors:
             command = self.inputs.get(f"{motor.name}.{motor.drive}", 0.0)
             begin = float(command.value[0]) if isinstance(command, Trajectory) else command
-            begins[f"{motor.name}.lagged"] = motor.share * begin
+            begins |= {f"{motor.name}.{state}": motor.share * begin for state in (*DELAYED, "lagged")}
         return begins
 
     def _states(self, initial: Mapping[str, float]) -> dict[str, float]:
