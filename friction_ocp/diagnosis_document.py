@@ -248,7 +248,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     closed = diagnosis.closed
     sources = {floor.source for floor in model.floors.values()}
     return {
-        "evaluated_on": [use.name for use in (problem.validation or problem.train)],
+        "evaluated_on": [use.file for use in (problem.validation or problem.train)],
         "horizon_s": horizon(model),
         "noise_source": sources.pop() if len(sources) == 1 else "mixed",
         "before": _table(diagnosis, diagnosis.before),

@@ -16,6 +16,7 @@ from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.stepping import state_symbols
+from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.nodes import solve_nodes
@@ -195,9 +196,10 @@ def _per_unit(term: StaticTerm, motor: Motor, numbers: Mapping[str, float]) -> f
 def _typical_torques(
     fitted: FittedModel, tables: Sequence[Mapping[str, FloatArray]], numbers: dict[str, float]
 ) -> dict[str, float]:
-    """Return the rms of motor torques, carried through the ratios to every shaft; 1 where there is no motor.
+    """Return the rms of motor torques, carried through the ratios to every shaft.
 
-    A motor without current, whose shaft is moved by an input, does what static points say.
+    A motor without current, whose shaft is moved by an input, does what static points say. Where there is no motor it
+    is what a prescribed motion was seen to take, else what accelerates the shaft.
     """
     drive = fitted.model.problem.drive
     found: dict[str, float] = {}
@@ -206,6 +208,10 @@ def _typical_torques(
         if not np.any(values) and fitted.model.static:
             values = np.concatenate([term.measured * _per_unit(term, motor, numbers) for term in fitted.model.static])
         found[motor.shaft] = max(float(np.sqrt(np.mean(values**2))), 1e-12)
+    for k, channel in enumerate(drive.outputs):
+        if channel.signal == DRIVE_TORQUE:
+            values = np.concatenate([item.measured[:, k] for item in fitted.model.train])
+            found.setdefault(channel.part, max(float(np.sqrt(np.nanmean(values**2))), 1e-12))
     for _ in drive.transmissions:
         for item in drive.transmissions:
             ratio = abs(numbers.get(f"{item.from_shaft}-{item.to_shaft}.ratio", 1.0))
@@ -213,4 +219,10 @@ def _typical_torques(
                 found[item.to_shaft] = found[item.from_shaft] * ratio
             elif item.to_shaft in found and item.from_shaft not in found:
                 found[item.from_shaft] = found[item.to_shaft] / ratio
-    return {shaft.name: found.get(shaft.name, 1.0) for shaft in drive.shafts}
+    return {shaft.name: found.get(shaft.name) or _accelerating(shaft.name, tables, numbers) for shaft in drive.shafts}
+
+
+def _accelerating(shaft: str, tables: Sequence[Mapping[str, FloatArray]], numbers: Mapping[str, float]) -> float:
+    """Return the rms of what accelerates a shaft by itself, N m."""
+    rates = np.concatenate([np.gradient(table[f"{shaft}.omega"], table["time"]) for table in tables])
+    return max(abs(numbers[f"{shaft}.inertia"]) * float(np.sqrt(np.mean(rates**2))), 1e-12)

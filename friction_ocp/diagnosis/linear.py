@@ -131,10 +131,14 @@ class LinearRecording:
 
     def moved_by(self, step: FloatArray) -> FloatArray:
         """Return (segments, states) how the nodes follow a change of the parameters."""
+        if not self.states:
+            return np.zeros((self.cut.count, 0))
         return self._solve(-self._transposed((self.direct @ step)[:, None]))[:, :, 0]
 
     def reduced(self, columns: FloatArray) -> FloatArray:
         """Return columns of rows with the nodes moved to their best places."""
+        if not self.states:  # the motion is prescribed
+            return columns
         moved = self._solve(-self._transposed(columns))
         return columns + self._applied(moved)
 
@@ -193,7 +197,7 @@ class LinearRecording:
         upper = upper * self.scale[:-1, :, None] * self.scale[1:, None, :]
         diagonal[: cut.measured] = np.eye(states)
         upper[: cut.measured] = 0.0
-        self.factors = _banded_factors(diagonal, upper)
+        self.factors = _banded_factors(diagonal, upper) if states else np.zeros((0, 0))
 
     def _solve(self, right: FloatArray) -> FloatArray:
         """Return (segments, s, k) node changes for a right-hand side; measured nodes do not move."""

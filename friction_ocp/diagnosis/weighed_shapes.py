@@ -13,7 +13,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reexamine import gaining, weighed_again
 from friction_ocp.diagnosis.refit import MOST_OF
-from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, with_first, without
 from friction_ocp.diagnosis.worth import grows
 from friction_ocp.effects.effect import Key
@@ -33,7 +33,7 @@ def weighed_in_shape(
     In the shape that the catalogue gives them the one may come nearer to what the other is on the machine, and a shape
     tells apart what was as likely before. `grown` is the round that gives a rival its more general shape. What explains
     more for certain takes the place, as does what explains the same with fewer parameters, or is the more probable;
-    what explains less for certain takes part no more.
+    what explains less for certain takes part no more, nor does what had the place, unless both say the same.
     """
     first, *shaped = rounds
     benchmark = Benchmark(bench.current)
@@ -46,8 +46,9 @@ def weighed_in_shape(
         fitted = rival.fitted if done is None else _held(done).fitted
         gains = -benchmark.dearer(fitted)
         if benchmark.yields(fitted, gains, level, rng):
-            held = _held(first).key
-            first = replace(first, choice=without(with_first(first.choice, rival), {held}), accepted=rival)
+            held, choice = _held(first), with_first(first.choice, rival)
+            choice = choice if is_same(rival, held) else without(choice, {held.key})
+            first = replace(first, choice=choice, accepted=rival)
             shaped, benchmark = shapes[rival.key], Benchmark(fitted)
             tried = gaining(tried, benchmark)
         elif fitted.cost > benchmark.fitted.cost + UNIMPORTANT and benchmark.certain(-gains, level, rng):

@@ -64,9 +64,24 @@ def undetermined_at_rest(mech: Mechanism) -> dict[int, str]:
             continue
         shafts = [mech.drive.shaft(name) for name in mech.topology.members(group)]
         if any(not item.friction.law.has_bristle and not isinstance(item.friction.law, NoFriction) for item in shafts):
-            source = next(item for item in mech.drive.inputs if mech.topology.group_of.get(item.part) == group)
+            source = _source(mech, group)
             found[k] = source.name + ("'" if source.signal == "theta" else "")
     return found
+
+
+def prescribed_accelerations(mech: Mechanism) -> dict[int, str]:
+    """Return the outputs that see a prescribed acceleration, each with the input that it is the derivative of."""
+    found: dict[int, str] = {}
+    for k, channel in enumerate(mech.drive.outputs):
+        group = mech.topology.group_of.get(channel.part) if channel.signal == "alpha" else _held_group(mech, channel)
+        if group in mech.prescribed:
+            found[k] = _source(mech, group).name
+    return found
+
+
+def _source(mech: Mechanism, group: int) -> Channel:
+    """Return the input that prescribes the motion of a group."""
+    return next(item for item in mech.drive.inputs if mech.topology.group_of.get(item.part) == group)
 
 
 def _held_group(mech: Mechanism, channel: Channel) -> int | None:

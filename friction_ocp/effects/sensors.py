@@ -8,10 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Channel, Drive
+from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_channel, channel, either_way
 from friction_ocp.parameters import Free
 
-_ANALOG = ("theta", "omega", "alpha", "current", "current_command", "torque", "voltage")
+_ANALOG = ("theta", "omega", "alpha", "current", "current_command", "torque", "voltage", DRIVE_TORQUE)
 
 
 def _analog(drive: Drive) -> list[Channel]:
@@ -28,6 +29,8 @@ def _size(item: Channel, clues: Clues) -> float:
     if item.signal in ("theta", "omega"):
         table = clues.angles(item.part) if item.signal == "theta" else clues.speeds(item.part)
         return max(float(np.std(table)), 1e-12)
+    if item.signal == DRIVE_TORQUE:
+        return max(clues.typical_torque[item.part], 1e-12)
     torques = [track.torque[item.part] for track in clues.tracks if item.part in track.torque]
     if torques:
         constant = clues.numbers.get(f"{item.part}.torque_constant", 1.0)

@@ -9,6 +9,7 @@ from typing import Any
 from friction_ocp.drive.parts import Clock, Drive
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.parameters import Value, start_of
+from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray
 
 Moves = Mapping[str, Mapping[str, tuple[float, float]]]
@@ -51,14 +52,33 @@ def _guessed(use: RecordingUse, drive: Drive) -> dict[str, tuple[float, float]]:
 def _moved(use: RecordingUse, drive: Drive, fast: Mapping[str, tuple[float, float]]) -> RecordingUse:
     original = use.original or use.recording
     foreign = {channel.name for channel in drive.channels if channel.clock in fast}
-    own = [item for name, item in original.channels.items() if name not in foreign] or list(original.channels.values())
-    start = min((item.time[0] for item in own if item.time.size), default=0.0)
+    start = log_start(original, drive)
     channels = dict(original.channels)
     for channel in drive.channels:
         if channel.name in foreign and channel.name in channels:
             found, (offset, drift) = channels[channel.name], fast[channel.clock]
-            channels[channel.name] = replace(found, time=_shown(found.time, float(start), offset, drift))
+            channels[channel.name] = replace(found, time=_shown(found.time, start, offset, drift))
     return replace(use, recording=replace(original, channels=channels), moved=dict(fast), original=original)
+
+
+def stamped(use: RecordingUse, drive: Drive, name: str, time: float) -> float:
+    """Return what the clock of a channel shows at a time of the recording, s: by its guess, where that is another."""
+    channel = next((item for item in drive.channels if item.name == name), None)
+    fast = _guessed(use, drive)
+    if channel is None or channel.clock not in fast:
+        return time
+    start = log_start(use.recording, drive)
+    offset, drift = fast[channel.clock]
+    return start + offset + (1.0 + drift) * (time - start)
+
+
+def log_start(recording: Recording, drive: Drive) -> float:
+    """Return when a log began on its own clock, s: from then on others drift, whatever piece of it is used."""
+    if recording.log_began is not None:
+        return recording.log_began
+    foreign = {channel.name for channel in drive.channels if drive.clock_of(channel) is not None}
+    own = {name: item for name, item in recording.channels.items() if name not in foreign}
+    return replace(recording, channels=own or recording.channels).first_sample
 
 
 def _shown(time: FloatArray, start: float, offset: float, drift: float) -> FloatArray:

@@ -9,18 +9,20 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from friction_ocp.drive.holding import undetermined_at_rest
+from friction_ocp.drive.holding import prescribed_accelerations, undetermined_at_rest
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import RecordingUse
-from friction_ocp.recording.conditioning import high_frequency_noise, smooth_motion
+from friction_ocp.recording.conditioning import high_frequency_noise, reach_of_ends, smooth_motion
 from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, IntArray, build_grid
 
 STILL, NOISE_OF_REST = 1e-3, 3.0
 """Share of the greatest speed, and standard deviations of its noise, up to which a prescribed speed has no sign."""
+MOST_LOST = 0.1
+"""Share of a prescribed motion that is left out at an end at most, where noise hides its acceleration."""
 
 
 COLUMNS = ("measured", "smooth", "rate", "curvature", "lost")
@@ -76,6 +78,9 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
     columns = [_on_nodes(grid, use, channel.name) for channel in outputs]
     for k, speed_of in undetermined_at_rest(drive.mechanism).items():
         columns[k] = np.where(_near_rest(grid, drive, speed_of, use), np.nan, columns[k])
+    known = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
+    for k, moved_by in prescribed_accelerations(drive.mechanism).items():
+        columns[k] = np.where(_beside_ends(grid, known[moved_by]), np.nan, columns[k])
     motions = [_smooth(grid, use, channel.name) for channel in outputs]
     return Experiment(
         name=use.name,
@@ -92,7 +97,7 @@ def with_inputs(item: Experiment, known: Sequence[str], wanted: Sequence[str], r
     """Return an experiment whose grid holds the inputs `wanted` in their order: those `known`, and the time."""
     if tuple(known) == tuple(wanted):
         return item
-    grid, start = item.grid, _clock(recording).time[0]
+    grid, start = item.grid, recording.zero
     ends = np.append(grid.time[1:], grid.time[-1])
     clocks = {"at_start": grid.time - start, "at_end": ends - start, "at_node": grid.time - start}
     columns = {
@@ -112,7 +117,7 @@ def _clock(recording: Recording) -> InputSignal:
     """Return the time since the start of a recording as an input."""
     times = [channel.time for channel in recording.channels.values() if channel.time.size]
     ends = np.array([min(time[0] for time in times), max(time[-1] for time in times)])
-    return InputSignal(ends, ends - ends[0], False)
+    return InputSignal(ends, ends - recording.zero, False)
 
 
 def _model_inputs(
@@ -136,6 +141,13 @@ def _model_inputs(
         else:
             laid.append(by_name[name])
     return laid
+
+
+def _beside_ends(grid: Grid, motion: InputSignal) -> BoolArray:
+    """Return (n,) whether a node is so near an end of a prescribed motion that its acceleration is not known there."""
+    length = float(motion.time[-1] - motion.time[0])
+    reach = min(reach_of_ends(motion.time, motion.values), MOST_LOST * length)
+    return (grid.time < motion.time[0] + reach) | (grid.time > motion.time[-1] - reach)
 
 
 def _near_rest(grid: Grid, drive: SteppedDrive, speed_of: str, use: RecordingUse) -> npt.NDArray[np.bool_]:

@@ -38,6 +38,11 @@ class RecordingUse:
         """Name of the recording in results."""
         return self.recording.name
 
+    @property
+    def file(self) -> str:
+        """Name of the file that holds it, with which piece is meant where it is one."""
+        return self.name if self.recording.path is None else self.name + self.recording.path.suffix
+
 
 @dataclass(frozen=True)
 class StaticUse:

@@ -8,6 +8,7 @@ from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.select import shown
 from friction_ocp.effects.effect import Key
 from friction_ocp.excitation.design import Design, Option, separating
+from friction_ocp.excitation.trial_run import is_driven
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
 
 _EXCITATION = {
@@ -44,7 +45,7 @@ class FollowUp:
     rivals: tuple[Key, ...]
     text: str
     design: Design | None
-    """Motions within the limits, the one that separates the rivals best first; None where none could be simulated."""
+    """Motions within the limits, the one that separates the rivals best first; None where no command makes a motion."""
 
     @property
     def option(self) -> Option | None:
@@ -62,14 +63,16 @@ def follow_up(diagnosis: Diagnosis, executor: AbstractExecutor = InProcess()) ->
     done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
     rivals = [rival for rival in shown(done.choice.aliases) if rival.key in wanted]
     keys = tuple(rival.key for rival in rivals)
+    if not is_driven(done.before.model.problem.drive):  # a free decay, or a motion that is prescribed
+        what = f"{_named(keys)} cannot be told apart here, and no command of a motor makes the motion"
+        return FollowUp(keys, f"{what}. {_shown_by(_hints(keys))}", None)
     design = separating(done.before, [rival.fitted for rival in rivals], executor)
     found = FollowUp(keys, "", design)
     return FollowUp(keys, _text(keys, found.option), design)
 
 
 def _text(keys: tuple[Key, ...], option: Option | None) -> str:
-    named = " and ".join(_spoken(key) for key in keys)
-    hints = [f"{_EXCITATION[key[0]]} ({_spoken(key)})" for key in keys if key[0] in _EXCITATION]
+    named, hints = _named(keys), _hints(keys)
     if option is None:
         return (
             f"No motion within the limits tells {named} apart with these channels: they say the same in other words, "
@@ -82,6 +85,14 @@ def _text(keys: tuple[Key, ...], option: Option | None) -> str:
     if power < EVEN:
         return f"To tell {named} apart takes many recordings. The best motion: {motion}{decides}. {_shown_by(hints)}"
     return f"To tell {named} apart, record {motion}{decides}."
+
+
+def _named(keys: tuple[Key, ...]) -> str:
+    return " and ".join(_spoken(key) for key in keys)
+
+
+def _hints(keys: tuple[Key, ...]) -> list[str]:
+    return [f"{_EXCITATION[key[0]]} ({_spoken(key)})" for key in keys if key[0] in _EXCITATION]
 
 
 def _shown_by(hints: list[str]) -> str:

@@ -144,6 +144,15 @@ def _watched(drive: Drive) -> Drive:
     return replace(drive, channels=(*drive.channels, *added))
 
 
+def is_driven(drive: Drive) -> bool:
+    """Whether a command of the first motor makes the motion, so that another can be designed."""
+    try:
+        refuse_what_is_not_driven(drive)
+    except FrictionOcpError:
+        return False
+    return True
+
+
 def refuse_what_is_not_driven(drive: Drive) -> None:
     """Raise FrictionOcpError for a drive whose motion no command of its first motor makes."""
     motor = first_motor(drive)

@@ -11,7 +11,7 @@ from typing import Any, cast
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.document import dump_document, read_document
-from friction_ocp.problem_file.load import recording_path
+from friction_ocp.problem_file.load import recording_path, span_of
 from friction_ocp.problem_file.salvage import copy_content, read_section
 from friction_ocp.problem_file.schema import ProblemSection
 
@@ -100,7 +100,12 @@ def _direction_last(keys: Sequence[str]) -> Sequence[str]:
 
 
 def _recording_names(content: dict[str, Any]) -> list[str]:
-    return [Path(_as_mapping(entry)["file"]).stem for entries in content["recordings"].values() for entry in entries]
+    return [_name_of(_as_mapping(entry)) for entries in content["recordings"].values() for entry in entries]
+
+
+def _name_of(entry: dict[str, Any]) -> str:
+    """Return what results call the recording of an entry, or the piece of it."""
+    return span_of(entry).named(Path(entry["file"]).stem)
 
 
 def _as_mapping(entry: Any) -> dict[str, Any]:
@@ -122,13 +127,14 @@ def settle_estimation(content: dict[str, Any], max_step: float | None, horizon_s
 
 def _rewritten(entry: dict[str, Any], source: Path, folder: Path, values: Mapping[str, float]) -> Any:
     """Return an entry whose file is named from `folder`, its own values beside it."""
-    name = Path(entry["file"]).stem
+    name = _name_of(entry)
     own = {
         path: float(value) for key, value in values.items() for path, _, owner in [key.partition("@")] if owner == name
     }
     file = entry["file"] if Path(entry["file"]).is_absolute() else _from(folder, recording_path(source, entry["file"]))
     numbers = {**entry.get("set", {}), **own}
-    return {"file": file, "set": numbers} if numbers else file
+    ends = {key: entry[key] for key in ("from", "to") if key in entry}
+    return {"file": file, **ends, **({"set": numbers} if numbers else {})} if ends or numbers else file
 
 
 def _from(folder: Path, path: Path) -> str:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from friction_ocp.drive.parts import Drive
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.pieces import Span, hull, piece_of
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.problem_file.check import check, check_file, check_rest
 from friction_ocp.problem_file.document import Document, read_document
@@ -19,6 +22,7 @@ from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.static_points import StaticPoints
 
 Use = RecordingUse | StaticUse
+_NO_ENDS = "correct `from` and `to`, or leave them out"
 AnyUse = TypeVar("AnyUse", RecordingUse, StaticUse)
 
 
@@ -30,6 +34,7 @@ class _Entry:
     index: int
     file: str
     set: Mapping[str, float]
+    span: Span
 
     @property
     def place(self) -> str:
@@ -59,9 +64,11 @@ def load_problem(path: str | Path, text: str | None = None) -> Problem:
 
 
 def _build(section: ProblemSection, uses: list[tuple[_Entry, Use]], document: Document) -> Problem:
+    drive = section.build_drive()
+    uses = _in_pieces(uses, drive, document.path)
     return Problem(
         title=section.title or document.path.stem,
-        drive=section.build_drive(),
+        drive=drive,
         train=_of_kind(uses, "train", RecordingUse),
         validation=_of_kind(uses, "validation", RecordingUse),
         static=_of_kind(uses, "train", StaticUse),
@@ -74,6 +81,19 @@ def _build(section: ProblemSection, uses: list[tuple[_Entry, Use]], document: Do
         diagnosis=section.diagnosis.model_dump(exclude_unset=True),
         limits=section.limits.model_dump(exclude_unset=True),
     )
+
+
+def _in_pieces(uses: list[tuple[_Entry, Use]], drive: Drive, problem: Path) -> list[tuple[_Entry, Use]]:
+    """Cut recordings to what the file uses of them."""
+    spans = dict[Path, list[Span]]()
+    for entry, _ in uses:
+        spans.setdefault(recording_path(problem, entry.file), []).append(entry.span)
+    cut = list[tuple[_Entry, Use]]()
+    for entry, use in uses:
+        if isinstance(use, RecordingUse):
+            use = piece_of(use, drive, entry.span, hull(spans[recording_path(problem, entry.file)]))
+        cut.append((entry, use))
+    return cut
 
 
 def _of_kind(uses: list[tuple[_Entry, Use]], kind: str, form: type[AnyUse]) -> tuple[AnyUse, ...]:
@@ -90,16 +110,29 @@ def _read_recordings(document: Document) -> tuple[list[tuple[_Entry, Use]], list
         if path not in known:
             known[path] = _read(path)
         recording = known[path]
+        place = f"{document.path}: {entry.place}"
         if isinstance(recording, Recording):
+            findings += _outside(recording, entry, place)
             uses.append((entry, RecordingUse(recording, entry.set, entry.place)))
         elif isinstance(recording, StaticPoints):
+            if not entry.span.is_all:
+                findings.append(Finding(f"{place}: {path}", "static points have no time", remedy=_NO_ENDS))
             uses.append((entry, StaticUse(recording, entry.set, entry.place)))
         else:
-            place = f"{document.path}: {entry.place}"
             findings += [
                 Finding(f"{place}: {item.where}", item.what, item.allowed, item.remedy) for item in recording.findings
             ]
     return uses, findings
+
+
+def _outside(recording: Recording, entry: _Entry, place: str) -> list[Finding]:
+    """Return that nothing was recorded in the piece that is asked for."""
+    timed = [channel for channel in recording.channels.values() if channel.time.size]
+    if entry.span.is_all or not timed or any(entry.span.holds(channel) for channel in timed):
+        return []
+    first, last = (float(end(channel.time[at] for channel in timed)) for end, at in ((min, 0), (max, -1)))
+    what = "nothing of it was recorded in the piece that `from` and `to` ask for"
+    return [Finding(f"{place}: {recording.path}", what, f"it lasts from {first:.6g} s to {last:.6g} s", _NO_ENDS)]
 
 
 def _read(path: Path) -> Recording | StaticPoints | FrictionOcpError:
@@ -123,7 +156,14 @@ def _entries(content: Mapping[str, Any]) -> Iterator[_Entry]:
             keys = cast(dict[str, Any], entry if isinstance(entry, dict) else {"file": entry})
             file, numbers = keys.get("file"), keys.get("set", {})
             if isinstance(file, str):
-                yield _Entry(kind, index, file, _numbers(numbers))
+                yield _Entry(kind, index, file, _numbers(numbers), span_of(keys))
+
+
+def span_of(entry: Mapping[str, Any]) -> Span:
+    """Return the piece that an entry of a recording asks for: all, where it makes no sense and the schema complains."""
+    ends = {key: end for key, end in _numbers(entry).items() if key in ("from", "to") and isfinite(end)}
+    span = Span(ends.get("from", -inf), ends.get("to", inf))
+    return span if span.begin < span.end else Span()
 
 
 def _numbers(value: Any) -> Mapping[str, float]:

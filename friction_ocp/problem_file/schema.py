@@ -230,7 +230,16 @@ class ChannelSection(Section):
 
 class RecordingSection(Section):
     file: str
+    begin: Finite | None = Field(None, alias="from")
+    end: Finite | None = Field(None, alias="to")
     set: dict[str, Finite] = Field(default_factory=dict[str, float])
+
+    @model_validator(mode="after")
+    def _begins_before_it_ends(self) -> Self:
+        if self.begin is not None and self.end is not None and self.begin >= self.end:
+            what = f"the piece ends at {self.end:.15g} s and begins at {self.begin:.15g} s"
+            raise refuse("recording", [Fault(("to",), what, "a time after `from`, s on the clock of the recording")])
+        return self
 
 
 def _read_recording_use(value: Any) -> RecordingSection:

@@ -130,7 +130,8 @@ def smooth_motion(
 
     It shifts no phase; its gain is 1/2 at the cutoff and falls with the fourth power of frequency above it. Without a
     cutoff it is as smooth as the noise floor allows: the residual has the size of `high_frequency_noise`. Missing
-    samples are bridged; the acceleration is zero at both ends. Source: Reinsch 1967.
+    samples are bridged; the acceleration is zero at both ends, and off beside them (`reach_of_ends`). Source: Reinsch
+    1967.
     """
     t = np.asarray(time, dtype=np.float64)
     t_present, y = _present(time, values)
@@ -138,14 +139,27 @@ def smooth_motion(
         allowed = f"at least {FEWEST_SAMPLES} are needed"
         raise FrictionOcpError(Finding("smooth motion", f"there are {len(t_present)} samples", allowed))
     step = float(np.mean(np.diff(t_present)))
-    if cutoff_hz is None:
-        penalty = _penalty_for_noise(t_present / step, y, high_frequency_noise(t_present, y))
-    else:
-        penalty = (2.0 * np.pi * cutoff_hz * step) ** -4
+    penalty = _penalty(t_present, y, step) if cutoff_hz is None else (2.0 * np.pi * cutoff_hz * step) ** -4
     smooth = y if penalty == 0.0 else _reinsch(t_present / step, y, penalty)
     spline = interpolate.CubicSpline(t_present, smooth, bc_type="natural")
     theta, omega, alpha = (np.asarray(spline(t, order), dtype=np.float64) for order in range(3))
     return theta, omega, alpha
+
+
+def reach_of_ends(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
+    """Return for how long, s, the ends of a smoothed motion bear on its acceleration, by more than a thousandth.
+
+    What a spline is forced to at an end decays by 2 - sqrt(3) a sample where it interpolates, and by exp(-1 / sqrt(2))
+    over the fourth root of its penalty, in samples, where it smooths.
+    """
+    t, y = _present(time, values)
+    step = float(np.mean(np.diff(t)))
+    smoothed = np.sqrt(2.0) * _penalty(t, y, step) ** 0.25
+    return step * float(np.log(1e3)) * max(smoothed, 1.0 / float(np.log(2.0 + np.sqrt(3.0))))
+
+
+def _penalty(t: FloatArray, y: FloatArray, step: float) -> float:
+    return _penalty_for_noise(t / step, y, high_frequency_noise(t, y))
 
 
 def _present(time: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

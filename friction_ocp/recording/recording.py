@@ -40,3 +40,17 @@ class Recording:
     sha256: str = ""
     attributes: Mapping[str, str] = field(default_factory=dict[str, str])
     """Further text attributes of the file, kept as found."""
+    log_began: float | None = None
+    """s, when the log began of which this is a piece; None is the first sample."""
+    counted_from: float | None = None
+    """s, where time is 0 for what changes with it, the same in all pieces of a log; None is the first sample."""
+
+    @property
+    def first_sample(self) -> float:
+        """The earliest stamp of all channels, s; 0 of no sample."""
+        return min((float(channel.time[0]) for channel in self.channels.values() if channel.time.size), default=0.0)
+
+    @property
+    def zero(self) -> float:
+        """Where time is 0 for what changes with it, s."""
+        return self.first_sample if self.counted_from is None else self.counted_from

@@ -88,6 +88,13 @@ def controller_ticks(controller: Controller | None, samples: FloatArray) -> tupl
     return compute, apply[apply <= end] if controller.delay > 0 else np.empty(0)
 
 
+def first_tick(controller: Controller | None, samples: FloatArray, time: float) -> float:
+    """Return when a sampled controller computes first from a time on, s; that time without one, or after its last."""
+    compute, _ = controller_ticks(controller, samples)
+    later = compute[compute >= time - 1e-9]
+    return float(later[0]) if later.size else time
+
+
 def _merge(times: list[FloatArray], tolerance: float) -> FloatArray:
     merged = np.unique(np.concatenate(times))
     keep = np.append(True, np.diff(merged) > tolerance)

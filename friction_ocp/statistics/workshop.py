@@ -58,4 +58,5 @@ class Workshop:
 
 
 def _content(use: RecordingUse) -> tuple[Any, ...]:
-    return use.name, dict(use.set), dict(use.recording.channels)
+    recording = use.recording
+    return use.name, dict(use.set), dict(recording.channels), recording.log_began, recording.counted_from

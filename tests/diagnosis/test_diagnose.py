@@ -45,7 +45,7 @@ def test_the_document_holds_what_it_promises(stribeck: tuple[Path, dict[str, Any
     for item in result["rounds"]:
         total = sum(item["probabilities"].values()) + sum(cause["probability"] for cause in item["causes"])
         assert total == pytest.approx(1.0)
-    assert result["gap"]["evaluated_on"] == ["c"]
+    assert result["gap"]["evaluated_on"] == ["c.h5"]
     low, high = result["gap"]["shrink"]["interval95"]
     assert 0.8 < low <= result["gap"]["shrink"]["overall"] <= high <= 1.0
     assert "motor.friction.viscous" in [item["name"] for item in result["biased_parameters"]]

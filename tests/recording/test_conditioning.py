@@ -12,6 +12,7 @@ from friction_ocp.recording.conditioning import (
     detect_resolution,
     high_frequency_noise,
     is_clipped,
+    reach_of_ends,
     smooth_motion,
     without_low_pass,
 )
@@ -234,3 +235,17 @@ def test_stamps_that_come_in_pairs_are_smoothed(rng: np.random.Generator) -> Non
     theta, omega, _ = smooth_motion(time, truth + 1e-3 * rng.standard_normal(time.size))
     assert np.sqrt(np.mean((theta - truth) ** 2)) < 3e-4
     assert np.sqrt(np.mean((omega - 0.5 * np.cos(0.5 * time))[20:-20] ** 2)) < 5e-3
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_ends_bear_on_the_acceleration_no_farther_than_their_reach(noise: float, rng: np.random.Generator) -> None:
+    """A body that speeds up evenly does so from reach to reach; a third of that from an end it seems not to."""
+    time = np.arange(0.0, 4.0, 0.01)
+    values = 10.0 * time**2 + noise * rng.standard_normal(time.size)
+    _, _, alpha = smooth_motion(time, values)
+    reach = reach_of_ends(time, values)
+    inside = (time > reach) & (time < time[-1] - reach)
+    assert np.mean(inside) > 0.5
+    assert np.max(np.abs(alpha[inside] / 20.0 - 1.0)) < 2e-3 + 4.0 * np.std(alpha[inside]) / 20.0
+    near = (time < reach / 3.0) | (time > time[-1] - reach / 3.0)
+    assert np.max(np.abs(alpha[near] / 20.0 - 1.0)) > 0.5

@@ -45,6 +45,25 @@ def recordings_have_names_of_their_own(case: Case) -> Iterator[Finding]:
             yield Finding(where, what, remedy="validate on a recording that is not trained on", severity="warning")
 
 
+def pieces_share_nothing(case: Case) -> Iterator[Finding]:
+    """No sample counts twice, and none that is held out is trained on, where pieces of one log are used."""
+    outputs = [channel.name for channel in case.drive.outputs]
+    known = list[tuple[str, RecordingUse, float, float]]()
+    for place, use in case.uses():
+        there = [use.recording.channels[name].time for name in outputs if name in use.recording.channels]
+        times = np.concatenate([time for time in there if time.size] or [np.empty(0)])
+        if not times.size or use.recording.path is None:
+            continue
+        begin, end = float(np.min(times)), float(np.max(times))
+        for other, piece, first, last in known:
+            shared = min(end, last) - max(begin, first)
+            if piece.recording.path == use.recording.path and piece.name != use.name and shared >= 0.0:
+                what = f"{quantity_text(shared, 's')} of this piece also stand in {other}"
+                remedy = "begin it where the other ends, or end it where that begins"
+                yield Finding(case.at_recording(place, use), what, remedy=remedy, severity="warning")
+        known.append((place, use, begin, end))
+
+
 def _path(use: RecordingUse | StaticUse) -> Path | None:
     return use.recording.path if isinstance(use, RecordingUse) else use.points.path
 
@@ -194,7 +213,7 @@ def _turned_round(case: Case, channel: Channel, shaft: str, sign: float) -> Iter
             yield Finding(where, what, allowed, remedy, "warning" if fits_elsewhere else "error")
 
 
-NAMES: tuple[Rule, ...] = (recordings_have_names_of_their_own,)
+NAMES: tuple[Rule, ...] = (recordings_have_names_of_their_own, pieces_share_nothing)
 RECORDINGS: tuple[Rule, ...] = (
     recordings_are_sound,
     recordings_have_the_channels,
