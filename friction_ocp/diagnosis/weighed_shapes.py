@@ -47,8 +47,8 @@ def weighed_in_shape(
         gains = -benchmark.dearer(fitted)
         if benchmark.yields(fitted, gains, level, rng):
             held, choice = _held(first), with_first(first.choice, rival)
-            choice = choice if is_same(rival, held) else without(choice, {held.key})
-            first = replace(first, choice=choice, accepted=rival)
+            same = is_same(rival.refitted(fitted, gains), held.refitted(benchmark.fitted, gains))
+            first = replace(first, choice=choice if same else without(choice, {held.key}), accepted=rival)
             shaped, benchmark = shapes[rival.key], Benchmark(fitted)
             tried = gaining(tried, benchmark)
         elif fitted.cost > benchmark.fitted.cost + UNIMPORTANT and benchmark.certain(-gains, level, rng):
