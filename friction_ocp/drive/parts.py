@@ -21,6 +21,8 @@ Motion = Literal["rotary", "linear"]
 ControllerType = Literal["duty", "p", "pd", "pi_velocity", "cascade"]
 Role = Literal["input", "output"]
 Hold = Literal["zero", "linear"]
+DRIVING_SIGNALS = ("torque", "current", "voltage")
+"""Signals of a motor that make it turn when they are inputs."""
 
 
 @dataclass(frozen=True)
@@ -295,6 +297,11 @@ class Channel:
         """What it looks at there: theta, omega, alpha, current, ..."""
         return self.measures.partition(".")[2]
 
+    @property
+    def is_driving(self) -> bool:
+        """Whether it is an input that moves the machine: a set point, a command or a prescribed motion."""
+        return self.role == "input" and self.signal in ("theta", "omega", *DRIVING_SIGNALS, "current_command")
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -328,7 +335,7 @@ class Drive:
     def driving_signal(self, motor: Motor) -> str | None:
         """Return what drives a motor: torque, current or voltage; None where nothing does."""
         given, controller = {channel.measures for channel in self.inputs}, self.controller
-        for signal in ("torque", "current", "voltage"):
+        for signal in DRIVING_SIGNALS:
             if f"{motor.name}.{signal}" in given or (controller is not None and controller.output == signal):
                 return signal
         return "current" if f"{motor.name}.current_command" in given else None
@@ -337,6 +344,21 @@ class Drive:
     def delaying(self) -> tuple[Motor, ...]:
         """The motors whose dead time only makes all outputs as late: one alone, whose command no loop makes."""
         return self.motors if self.controller is None and len(self.motors) == 1 else ()
+
+    @property
+    def acted_on(self) -> Channel | None:
+        """The input that alone moves the machine, so that all outputs are early where it is recorded late.
+
+        None where a loop is closed, or several inputs move it.
+        """
+        driving = [item for item in self.inputs if item.is_driving]
+        return driving[0] if self.controller is None and len(driving) == 1 else None
+
+    @property
+    def recorded_late(self) -> Channel | None:
+        """That input if how late it is recorded is to be found; a known delay shifts its samples."""
+        moves = self.acted_on
+        return None if moves is None or isinstance(moves.delay, (int, float)) else moves
 
     @property
     def prescribing(self) -> tuple[Channel, ...]:

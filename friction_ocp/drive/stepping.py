@@ -318,8 +318,8 @@ def stepped(drive: Drive) -> SteppedDrive:
     h, width, kind = symbol("h"), ca.SX.sym("width", groups + 1), symbol("kind")
     y, dy, ddy = (ca.SX.sym(name, len(mech.drive.outputs)) for name in ("y", "dy", "ddy"))
     arguments = [state.x, u, p, h, width]
-    dead = any(not is_off(motor.dead_time) for motor in drive.delaying)
-    late = {channel.name for channel in drive.outputs if dead or channel.delay != 0.0 or channel.clock}
+    all_late = drive.recorded_late is not None or any(not is_off(motor.dead_time) for motor in drive.delaying)
+    late = {channel.name for channel in drive.outputs if all_late or channel.delay != 0.0 or channel.clock}
     maps = {"step": _advance(mech, state, h, width), "output": _outputs(mech, state, h, width, late)}
     tick = ca.Function("tick", [state.x, u, p, kind], [_tick(mech, state, kind)]) if mech.memory_names else None
     return SteppedDrive(

@@ -18,7 +18,8 @@ def _motors(drive: Drive) -> list[Motor]:
 
 def _shows_dead_time(drive: Drive) -> bool:
     """Whether a command that is acted on late is more than a late sensor: it makes several late by the same time."""
-    return any(is_off(motor.dead_time) for motor in drive.delaying) and len(drive.outputs) > 1
+    known = drive.recorded_late is None
+    return known and any(is_off(motor.dead_time) for motor in drive.delaying) and len(drive.outputs) > 1
 
 
 def _step(clues: Clues) -> float:

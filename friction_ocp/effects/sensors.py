@@ -82,9 +82,12 @@ class SensorDelayEffect(AbstractEffect):
     resembles: ClassVar[tuple[str, ...]] = ("drive_lag",)
 
     def places(self, drive: Drive) -> Iterable[str]:
-        return [item.name for item in drive.outputs if item in _analog(drive) and item.delay == 0.0]
+        """Return the outputs, and the input that alone moves the machine."""
+        return [item.name for item in (*drive.outputs, drive.acted_on) if item in _analog(drive) and item.delay == 0.0]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        """Return the drive with a late channel; no output is early that a late input could make so."""
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{place}.delay"
-        added = change_channel(drive, place, delay=Free(step, -20.0 * step, 100.0 * step))
+        earliest = -step if drive.acted_on is not None else -20.0 * step
+        added = change_channel(drive, place, delay=Free(step, earliest, 100.0 * step))
         return Augmentation(added, {path: 0.0}, (Trial(({path: step},)),))

@@ -212,7 +212,7 @@ def with_drive(model: Model, drive: Drive) -> Model:
         static=tuple(static_term(use, drive, space) for use in problem.static),
         static_validation=tuple(static_term(use, drive, space) for use in problem.static_validation),
     )
-    known = all(isinstance(motor.dead_time, (int, float)) for motor in drive.delaying)
+    known = drive.recorded_late is None and all(isinstance(motor.dead_time, (int, float)) for motor in drive.delaying)
     stated = [channel.name for channel in drive.outputs if known and isinstance(channel.delay, (int, float))]
     return in_time(seen, space.guess, stated)
 

@@ -165,6 +165,9 @@ def _table(
             dead, resolved[f"{motor.name}.dead_time"] = resolved[f"{motor.name}.dead_time"], 0.0
             for channel in drive.outputs:
                 resolved[f"{channel.name}.delay"] = resolved[f"{channel.name}.delay"] + dead
+    if drive.recorded_late is not None:  # a drive that is seen earlier
+        for channel in drive.outputs:
+            resolved[f"{channel.name}.delay"] -= resolved[f"{drive.recorded_late.name}.delay"]
     if isinstance(use, RecordingUse):  # what is undone in the recording already is not the model's to do
         for channel, seconds in use.late.items():
             resolved[f"{channel}.delay"] = resolved[f"{channel}.delay"] - seconds

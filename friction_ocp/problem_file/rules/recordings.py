@@ -15,7 +15,6 @@ from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
 from friction_ocp.problem_file.rules.clipping import channels_are_not_clipped
 from friction_ocp.problem_file.rules.power import sign_of_work
-from friction_ocp.problem_file.rules.signals import is_driving
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.checks import check_recording
 from friction_ocp.recording.conditioning import FEWEST_SAMPLES
@@ -127,7 +126,7 @@ def _if_moving_otherwise(case: Case, channel: Channel, unit: str) -> str:
 
 def inputs_move(case: Case) -> Iterator[Finding]:
     """What drives the machine changes in at least one training recording."""
-    driving = [channel for channel in case.drive.inputs if is_driving(channel)]
+    driving = [channel for channel in case.drive.inputs if channel.is_driving]
     still = {channel.name: level for channel in driving if (level := _only_level(case, channel)) is not None}
     for name, level in still.items():
         what = f"input '{name}' never moves: it is {level} throughout all training recordings"

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from friction_ocp.drive.parts import Channel, Drive, Motor
+from friction_ocp.drive.parts import DRIVING_SIGNALS, Drive, Motor
 from friction_ocp.drive.topology import topology
 from friction_ocp.drive.units import DRIVE_TORQUE, MOTOR_SIGNALS, REFERENCE_SIGNALS, SHAFT_SIGNALS
 from friction_ocp.errors import Finding
 from friction_ocp.expressions import closest
 from friction_ocp.problem_file.rules.case import Case, Rule
 
-DRIVING_SIGNALS = ("torque", "current", "voltage")
-"""Signals of a motor that make it turn when they are inputs."""
 _PREDICTED = {"theta", "omega", "alpha", "torque", "current", "voltage", DRIVE_TORQUE}
 _REFERENCE_OF = {"duty": "theta", "p": "theta", "pd": "theta", "cascade": "theta", "pi_velocity": "omega"}
 _OTHER_WORDS = {"position": "theta", "angle": "theta", "velocity": "omega", "speed": "omega", "acceleration": "alpha"}
@@ -213,14 +211,13 @@ def duty_controller_has_a_supply(case: Case) -> Iterator[Finding]:
 
 
 def delays_of_inputs_are_known(case: Case) -> Iterator[Finding]:
-    """The clock of an input is shifted before the fit; a shift to be found is that of the outputs against it."""
+    """The clock of an input is shifted before the fit; a shift to be found is that of all outputs against it."""
     for channel in case.drive.inputs:
-        if not isinstance(channel.delay, (int, float)):
+        if not isinstance(channel.delay, (int, float)) and channel is not case.drive.acted_on:
             where = case.at(f"channels.{channel.name}.delay")
-            what = f"{channel.name} is an input, and its delay cannot be fitted"
-            yield Finding(
-                where, what, "a number", "fit the delay of the outputs instead: late inputs are early outputs"
-            )
+            what = f"{channel.name} is not the only input that moves the machine, and its delay cannot be fitted"
+            remedy = "fit the delay of the outputs instead: late inputs are early outputs"
+            yield Finding(where, what, "a number", remedy)
 
 
 def clocks_exist(case: Case) -> Iterator[Finding]:
@@ -260,11 +257,6 @@ def process_noise_acts_on_shafts(case: Case) -> Iterator[Finding]:
         if name not in names:
             where = case.at(f"estimation.process_noise.{name}")
             yield Finding(where, f"unknown shaft '{name}'", f"there are {', '.join(names)}", closest(name, names))
-
-
-def is_driving(channel: Channel) -> bool:
-    """Whether an input channel is what moves the machine: a set point, a command or a prescribed motion."""
-    return channel.role == "input" and channel.signal in ("theta", "omega", *DRIVING_SIGNALS, "current_command")
 
 
 SIGNALS: tuple[Rule, ...] = (

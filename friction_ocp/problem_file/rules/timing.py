@@ -11,7 +11,6 @@ from friction_ocp.drive.parts import Channel
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
-from friction_ocp.problem_file.rules.signals import is_driving
 
 _MUCH = 0.5
 """Share of the time of a channel that a delay may move out of the recording before it is doubted."""
@@ -20,7 +19,7 @@ _MUCH = 0.5
 def delays_are_shorter_than_recordings(case: Case) -> Iterator[Finding]:
     """Once delays and clocks are taken back, outputs are seen while inputs drive the machine."""
     told: set[str] = set()
-    driving = [channel for channel in case.drive.inputs if is_driving(channel)]
+    driving = [channel for channel in case.drive.inputs if channel.is_driving]
     for (_, use), output, channel in product(case.uses(), case.drive.outputs, driving):
         one, other = _span(case, use, output), _span(case, use, channel)
         if one is None or other is None:
