@@ -73,8 +73,8 @@ FILE_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
             put("channels/current/delay", {"guess": 0.0, "min": -0.01, "max": 0.01}),
             put("channels/pull", {"measures": "motor.torque", "role": "input"}),
         ),
-        "channels.current.delay: current is not the only input that moves the machine, and its delay cannot be fitted; a "
-        "number; fit the delay of the outputs",
+        "channels.current.delay: current is not the only input that moves the machine, and its delay cannot be fitted; "
+        "a number; fit the delay of the outputs",
     ),
     "unknown key of a law": (put(f"{FRICTION}/sigma0", 1.0), "drive.shafts[0].friction.sigma0: unknown key 'sigma0'; "),
     "key that other laws have": (
