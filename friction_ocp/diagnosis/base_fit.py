@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from friction_ocp.diagnosis.easing import along, eased, finer
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
+from friction_ocp.diagnosis.own_noise import noise_moved
 from friction_ocp.diagnosis.polishing import COARSE, WARM, loosely_joined, polished, timed
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.errors import Finding, FrictionOcpError
@@ -22,6 +25,9 @@ from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute
 
+RELAID, MOST_RELAID = float(np.log(2.0)), 2
+"""Factor, by its logarithm, between what torque noise moves where a base fit ends and where its gaps were laid, above
+which they are laid anew; how often at most. A rotor that is much too light there hides what is missing later."""
 BLUNT = 0.2
 """Rounding of the absolute loss over the mean error while models compete: kinks would catch a refit of a few steps."""
 
@@ -55,8 +61,18 @@ def _fitted_base(model: Model) -> FittedModel:
     foot = footing(model, end.theta)
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
-    started = polished(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
-    return freed(timed(_from_rest(_from_afar(started, [model.space.guess, end.theta]))))
+    fitted = _joined(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
+    for _ in range(MOST_RELAID):
+        if noise_moved(fitted.linear.program, model, fitted.footing, fitted.theta) < RELAID:
+            break
+        fitted = _joined(model, footing(model, fitted.theta), fitted.theta, None)
+    return fitted
+
+
+def _joined(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:
+    """Fit segments that torque noise joins, as a footing lays them, from a start."""
+    started = polished(model, foot, theta, nodes)
+    return freed(timed(_from_rest(_from_afar(started, [model.space.guess, theta]))))
 
 
 def predicting(fitted: FittedModel) -> FittedModel:

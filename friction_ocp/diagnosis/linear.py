@@ -114,11 +114,12 @@ class LinearRecording:
     def _stack_columns(self, by_y: FloatArray, by_end: FloatArray, starts: FloatArray | None = None) -> FloatArray:
         """Return (rows, k) from changes of scaled outputs (n, outputs, k) and of segment ends (segments - 1, s, k)."""
         count = by_y.shape[2]
-        y = np.where(self.seen[:, :, None], by_y, 0.0).reshape(-1, count)
+        y = np.where(self.seen[:, :, None], by_y, 0.0).reshape(self.seen.size, count)
         ends = np.zeros((0, count))
         if self.cut.gap_weight is not None and self.cut.count > 1:
-            ends = np.einsum("kij,kjp->kip", self.cut.gap_weight, by_end).reshape(-1, count)
-        rest = np.zeros((self._start_rows, count)) if starts is None else starts.reshape(-1, count)
+            weighted = np.einsum("kij,kjp->kip", self.cut.gap_weight, by_end)
+            ends = weighted.reshape((self.cut.count - 1) * self.states, count)
+        rest = np.zeros((self._start_rows, count)) if starts is None else starts.reshape(self._start_rows, count)
         return np.concatenate([y, ends, rest])
 
     @property
@@ -137,7 +138,7 @@ class LinearRecording:
 
     def reduced(self, columns: FloatArray) -> FloatArray:
         """Return columns of rows with the nodes moved to their best places."""
-        if not self.states:  # the motion is prescribed
+        if not self.states or not columns.shape[1]:  # the motion is prescribed, or nothing is fitted
             return columns
         moved = self._solve(-self._transposed(columns))
         return columns + self._applied(moved)
@@ -146,14 +147,16 @@ class LinearRecording:
         """Return the change of all rows for moved nodes (segments, s, k)."""
         count = moved.shape[2]
         y = np.einsum("nos,nsk->nok", self.dy, moved[self.segment])
-        y = np.where(self.seen[:, :, None], y, 0.0).reshape(-1, count)
+        y = np.where(self.seen[:, :, None], y, 0.0).reshape(self.seen.size, count)
         parts = [y]
         if self.cut.gap_weight is not None and self.cut.count > 1:
             gap = np.einsum("kij,kjp->kip", self.dend[:-1], moved[:-1]) - moved[1:]
-            parts.append(np.einsum("kij,kjp->kip", self.cut.gap_weight, gap).reshape(-1, count))
+            weighted = np.einsum("kij,kjp->kip", self.cut.gap_weight, gap)
+            parts.append(weighted.reshape((self.cut.count - 1) * self.states, count))
         if self.cut.start_weight is not None:
             tied = self.cut.tied
-            parts.append((self.cut.start_weight[tied][:, :, None] * moved[tied]).reshape(-1, count))
+            pulled = self.cut.start_weight[tied][:, :, None] * moved[tied]
+            parts.append(pulled.reshape(self._start_rows, count))
         return np.concatenate(parts)
 
     def _transposed(self, columns: FloatArray) -> FloatArray:

@@ -40,6 +40,16 @@ def with_own_noise(
     return replace(program, segments=tuple(cut for cut, _ in found)), tuple(price for _, price in found)
 
 
+def noise_moved(program: Program, model: Model, foot: Footing, theta: FloatArray) -> float:
+    """Return by how much the logarithm of what torque noise moves differs at `theta` from what the gaps are laid for.
+
+    The mean over all gaps and states: 0 where nothing is joined.
+    """
+    _, wider = with_own_noise(program, model, foot, theta)
+    each = np.concatenate(wider) / max(model.state_scale.size, 1)
+    return float(np.mean(np.abs(each))) if each.size else 0.0
+
+
 def _reweighed(
     model: Model, foot: Footing, moving: Footing, item: Experiment, cut: Segments
 ) -> tuple[Segments, FloatArray]:
