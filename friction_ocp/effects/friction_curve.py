@@ -32,7 +32,7 @@ from friction_ocp.friction.composite import (
 )
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.maxwell import AbstractMaxwellSlip
-from friction_ocp.friction.static import NoFriction, Polyline, Quadratic, Stribeck, Viscous
+from friction_ocp.friction.static import CoulombViscous, NoFriction, Polyline, Quadratic, Stribeck, Viscous
 from friction_ocp.parameters import Directional, Free, Tie, Value, is_off
 
 SHARE = 0.05
@@ -76,6 +76,26 @@ def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
     speed = clues.typical_speed(place)
     tried = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
     return Free(tried[len(tried) // 2], 1e-2 * tried[0], 3.0 * speed), tried
+
+
+class FrictionEffect(AbstractEffect):
+    """The model knows of no friction at all."""
+
+    name: ClassVar[str] = "friction"
+    sentence: ClassVar[str] = "the drive has dry and viscous friction"
+
+    def places(self, drive: Drive) -> Iterable[str]:
+        """Return the shafts of a drive without any friction: beside that of one, others may be known to have none."""
+        if all(isinstance(shaft.friction.law, NoFriction) for shaft in drive.shafts):
+            yield from (shaft.name for shaft in moving_shafts(drive))
+
+    def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
+        dry, viscous = f"{place}.friction.tau_c", f"{place}.friction.viscous"
+        size = SHARE * clues.typical_torque[place]
+        slope = size / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12)
+        law = CoulombViscous(upwards(size), upwards(slope))
+        added = change_shaft(drive, place, friction=replace(drive.shaft(place).friction, law=law))
+        return Augmentation(added, {dry: 0.0, viscous: 0.0}, (Trial(({dry: size}, {viscous: slope})),))
 
 
 class StribeckEffect(AbstractEffect):

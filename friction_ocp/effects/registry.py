@@ -11,6 +11,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import AbstractEffect
 from friction_ocp.effects.friction_curve import (
     AsymmetryEffect,
+    FrictionEffect,
     PolylineBreakEffect,
     QuadraticDragEffect,
     StribeckEffect,
@@ -39,6 +40,7 @@ from friction_ocp.effects.torques import ConstantTorqueEffect, StructuralModeEff
 Effect = TypeVar("Effect", bound=type[AbstractEffect])
 
 BUILT_IN: tuple[type[AbstractEffect], ...] = (
+    FrictionEffect,
     StribeckEffect,
     PolylineBreakEffect,
     QuadraticDragEffect,
