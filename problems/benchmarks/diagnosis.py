@@ -184,11 +184,17 @@ def no_gap(line: str, quick: bool) -> Check:
 
 def every_effect(line: str, quick: bool) -> Check:
     """Run the test of every effect; which of them has none is told."""
-    text = (ROOT / "tests" / "diagnosis" / "test_effects_found.py").read_text(encoding="utf-8")
-    missing = [name for name in effects() if f'"{name}": (' not in text]
-    told = [f"without a test in tests/diagnosis/test_effects_found.py: {', '.join(missing) or 'none'}"]
+    text = (ROOT / "tests" / "diagnosis" / "effect_cases.py").read_text(encoding="utf-8")
+    page = (ROOT / "problems" / "effects" / "README.md").read_text(encoding="utf-8")
+    untested = [name for name in effects() if f'"{name}": EffectCase(' not in text]
+    unseen = [name for name in effects() if f"\n## {name}\n" not in page]
+    missing = [*untested, *unseen]
+    told = [
+        f"without a case in tests/diagnosis/effect_cases.py: {', '.join(untested) or 'none'}",
+        f"without a section in problems/effects/README.md: {', '.join(unseen) or 'none'}",
+    ]
     if quick:
-        return Check(line, told[0], False if missing else None)
+        return Check(line, "\n".join(told), False if missing else None)
     ran = tests_check(line, "tests/diagnosis/test_effects_found.py")
     return Check(line, "\n".join([*told, ran.measured, "pages are looked at by eye"]), bool(ran.passed and not missing))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -10,8 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import INERTIA, axis, write_case
-from plant import Plant, PlantFriction, PlantShaft, PlantTransmission
+from diagnosis_cases import INERTIA, write_case
+from effect_cases import hung
 
 from friction_ocp.diagnosis import refit
 from friction_ocp.diagnosis.diagnose import diagnose
@@ -21,19 +20,12 @@ HUNG, RATE = 0.75, 2.0 * np.pi * 9.0
 """Share of the inertia on the spring, and its frequency while the motor stands still, rad/s."""
 
 
-def hung() -> Plant:
-    """Return the axis with most of its inertia behind a spring."""
-    plain, mass = axis(), HUNG * INERTIA
-    spring = PlantTransmission("motor", "part", 1.0, mass * RATE**2, 0.06 * mass * RATE)
-    rest = replace(plain.shafts[0], inertia=INERTIA - mass)
-    part = PlantShaft("part", mass, PlantFriction("none"))
-    return replace(plain, shafts=(rest, part), transmissions=(spring,))
-
-
 @pytest.mark.slow
 def test_most_of_a_stated_inertia_is_found_on_a_spring(tmp_path: Path) -> None:
     """The file states the whole inertia as known; what hangs is told from it, and nothing else is blamed."""
-    path = write_case(tmp_path, hung(), effects=["structural_mode", "inertia_error", "drive_lag", "sensor_delay"])
+    path = write_case(
+        tmp_path, hung(HUNG, RATE), effects=["structural_mode", "inertia_error", "drive_lag", "sensor_delay"]
+    )
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
     document["drive"]["shafts"][0]["inertia"] = INERTIA
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
