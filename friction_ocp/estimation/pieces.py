@@ -51,9 +51,9 @@ def piece_of(use: RecordingUse, drive: Drive, span: Span, within: Span) -> Recor
     their own keep a sample beyond either end, so that they are known up to it. Channels that other clocks stamp are cut
     where these show the same time, at their guesses.
     """
-    recording = use.recording
-    zero = within.begin if isfinite(within.begin) else recording.first_sample
-    recording = replace(recording, log_began=log_start(recording, drive), counted_from=zero)
+    began = log_start(use.recording, drive)
+    zero = within.begin if isfinite(within.begin) else began
+    recording = replace(use.recording, log_began=began, counted_from=zero)
     whole = replace(use, recording=recording)
     if span.is_all:
         return whole

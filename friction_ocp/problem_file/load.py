@@ -90,8 +90,9 @@ def _in_pieces(uses: list[tuple[_Entry, Use]], drive: Drive, problem: Path) -> l
         spans.setdefault(recording_path(problem, entry.file), []).append(entry.span)
     cut = list[tuple[_Entry, Use]]()
     for entry, use in uses:
-        if isinstance(use, RecordingUse):
-            use = piece_of(use, drive, entry.span, hull(spans[recording_path(problem, entry.file)]))
+        pieces = spans[recording_path(problem, entry.file)]
+        if isinstance(use, RecordingUse) and not all(span.is_all for span in pieces):
+            use = piece_of(use, drive, entry.span, hull(pieces))
         cut.append((entry, use))
     return cut
 
