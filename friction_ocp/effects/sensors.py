@@ -86,8 +86,8 @@ class SensorDelayEffect(AbstractEffect):
         return [item.name for item in (*drive.outputs, drive.acted_on) if item in _analog(drive) and item.delay == 0.0]
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        """Return the drive with a late channel; no output is early that a late input could make so."""
+        """Return the drive with a late channel; none shows the future where a late input can make outputs early."""
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{place}.delay"
-        earliest = -step if drive.acted_on is not None else -20.0 * step
+        earliest = 0.0 if drive.acted_on is not None else -20.0 * step
         added = change_channel(drive, place, delay=Free(step, earliest, 100.0 * step))
         return Augmentation(added, {path: 0.0}, (Trial(({path: step},)),))

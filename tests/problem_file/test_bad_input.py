@@ -592,7 +592,7 @@ def test_a_motion_of_a_few_samples_is_told_at_its_recording(workshop: Workshop) 
 REQUESTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "effect that does not exist": (
         put("diagnosis", {"effects": ["stribek"]}),
-        "diagnosis.effects: unknown effect 'stribek'; available: stribeck, ",
+        "diagnosis.effects: unknown effect 'stribek'; available: friction, stribeck, ",
     ),
     "effect with a slip": (put("diagnosis", {"exclude": ["coging"]}), "did you mean 'cogging'?"),
     "effect at a place as design has it": (
