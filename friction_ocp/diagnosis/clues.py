@@ -207,11 +207,11 @@ def _typical_torques(
         values = np.concatenate([table[f"{motor.name}.torque"] for table in tables])
         if not np.any(values) and fitted.model.static:
             values = np.concatenate([term.measured * _per_unit(term, motor, numbers) for term in fitted.model.static])
-        found[motor.shaft] = max(float(np.sqrt(np.mean(values**2))), 1e-12)
+        found[motor.shaft] = max(_rms([values]), 1e-12)
     for k, channel in enumerate(drive.outputs):
         if channel.signal == DRIVE_TORQUE:
-            values = np.concatenate([item.measured[:, k] for item in fitted.model.train])
-            found.setdefault(channel.part, max(float(np.sqrt(np.nanmean(values**2))), 1e-12))
+            columns = [item.measured[:, k] for item in fitted.model.train]
+            found.setdefault(channel.part, max(_rms([values[np.isfinite(values)] for values in columns]), 1e-12))
     for _ in drive.transmissions:
         for item in drive.transmissions:
             ratio = abs(numbers.get(f"{item.from_shaft}-{item.to_shaft}.ratio", 1.0))
@@ -224,5 +224,5 @@ def _typical_torques(
 
 def _accelerating(shaft: str, tables: Sequence[Mapping[str, FloatArray]], numbers: Mapping[str, float]) -> float:
     """Return the rms of what accelerates a shaft by itself, N m."""
-    rates = np.concatenate([np.gradient(table[f"{shaft}.omega"], table["time"]) for table in tables])
-    return max(abs(numbers[f"{shaft}.inertia"]) * float(np.sqrt(np.mean(rates**2))), 1e-12)
+    rates = [np.gradient(table[f"{shaft}.omega"], table["time"]) for table in tables]
+    return max(abs(numbers[f"{shaft}.inertia"]) * _rms(rates), 1e-12)

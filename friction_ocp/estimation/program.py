@@ -291,15 +291,11 @@ class Program:
     def objective(self, point: Point) -> float:
         """Return the cost of a point; infinite where the simulation breaks down."""
         with np.errstate(over="ignore", invalid="ignore"):
-            total = self._whole_cost(point)
+            total = self._parameter_cost(point.theta)
+            for index, (result, score) in enumerate(self._scored(point, self.measured_starts(point.theta))):
+                total += float(np.sum(score.cost)) + 0.5 * float(np.sum(self.start_errors(index, point) ** 2))
+                total += 0.5 * float(np.sum(self.gap_errors(index, point, result.end) ** 2))
         return total if np.isfinite(total) else np.inf
-
-    def _whole_cost(self, point: Point) -> float:
-        total = self._parameter_cost(point.theta)
-        for index, (result, score) in enumerate(self._scored(point, self.measured_starts(point.theta))):
-            total += float(np.sum(score.cost)) + 0.5 * float(np.sum(self.start_errors(index, point) ** 2))
-            total += 0.5 * float(np.sum(self.gap_errors(index, point, result.end) ** 2))
-        return total
 
     def _parameter_cost(self, theta: FloatArray) -> float:
         """Return the cost of what hangs on the parameters alone."""
