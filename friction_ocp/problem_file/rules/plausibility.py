@@ -25,6 +25,8 @@ _NONE = 1e-6
 """Scatter over stated noise below which the samples carry no noise at all; no unit is off by as much."""
 _RATIO_SLIP = 2.0
 """Factor between two sensors of one motion that no guess of a ratio is off by."""
+_MORE = 1.2
+"""Scatter in every recording over what rounding makes, from which a sensor has noise besides."""
 _ALIKE = 0.9
 """Correlation of speeds from which two sensors see one motion."""
 _SELDOM = 0.5
@@ -69,6 +71,24 @@ def resolution_is_seen(case: Case) -> Iterator[Finding]:
         where = case.at(f"channels.{channel.name}.resolution")
         remedy = "convert it, or leave it out: it is measured then"
         yield Finding(where, what, f"the step in {unit}", remedy, "warning")
+
+
+def rounding_is_the_noise(case: Case) -> Iterator[Finding]:
+    """Where the file states a resolution and no noise, the samples scatter as rounding makes them, and no more."""
+    for channel in case.drive.outputs:
+        if channel.resolution is None or channel.noise_std is not None:
+            continue
+        records = _records(case, channel)
+        seen = [high_frequency_noise(item.time, item.values) for item in records]
+        known = [value for value in seen if np.isfinite(value)]
+        rounding = channel.resolution / np.sqrt(12.0)
+        if not known or min(known) <= _MORE * rounding:
+            continue
+        unit, scatter = records[0].unit, float(np.median(known))
+        what = f"the samples scatter by {scatter:.2g} {unit}, more than the {rounding:.2g} {unit} of their resolution"
+        where = case.at(f"channels.{channel.name}.resolution")
+        remedy = f"state `noise_std: {scatter:.2g}` beside it, or all above the resolution is taken for a gap"
+        yield Finding(where, what, "resolution / sqrt(12), unless noise_std is stated", remedy, "warning")
 
 
 def _records(case: Case, channel: Channel) -> list[RecordedChannel]:
@@ -168,6 +188,7 @@ def samples_are_not_repeated(case: Case) -> Iterator[Finding]:
 PLAUSIBILITY: tuple[Rule, ...] = (
     stated_noise_is_seen,
     resolution_is_seen,
+    rounding_is_the_noise,
     sensors_of_one_motion_agree,
     samples_come_often_enough,
     samples_have_no_gaps,
