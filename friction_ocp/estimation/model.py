@@ -36,6 +36,8 @@ NEVER = 1e12
 
 MOST_STEPS = 1000
 """Integrator steps in a usual sampling interval: beyond them the guesses make no sense."""
+MOST_OF_ANOTHER = 100
+"""The same for what is added to a drive, whose guesses suit a fit that may lie far from those of the rest."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,7 @@ def with_drive(model: Model, drive: Drive) -> Model:
     sweep = sweep_of(drive, tuple(space.active))
     max_step = model.max_step
     if model.problem.estimation.max_step is None:
-        max_step = min(max_step, integrator_step(after, space, problem))
+        max_step = min(max_step, integrator_step(after, space, problem, MOST_OF_ANOTHER))
     train, validation = (
         tuple(_with_step(seen_by(model, after, item), max_step, model.max_step) for item in items)
         for items in (model.train, model.validation)
@@ -327,8 +329,11 @@ def _wider(first: dict[str, SpeedRange], second: dict[str, SpeedRange]) -> dict[
     }
 
 
-def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
-    """Return the longest step, s, that resolves the fastest mode of the drive at the guesses, at standstill."""
+def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem, most: int = MOST_STEPS) -> float:
+    """Return the longest step, s, that resolves the fastest mode of the drive at the guesses, at standstill.
+
+    It is taken at `most` so many times in a usual sampling interval.
+    """
     longest = 10.0
     for use in problem.train:
         typical = [_typical(use, name) for name in drive.input_names]
@@ -338,7 +343,7 @@ def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem
         longest = min(longest, STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6))
     intervals = [np.diff(channel.time) for use in problem.train for channel in use.recording.channels.values()]
     usual = min((float(np.median(steps)) for steps in intervals if steps.size), default=0.0)
-    return max(longest, usual / MOST_STEPS)
+    return max(longest, usual / most)
 
 
 def slowest_period(drive: SteppedDrive, space: ParameterSpace, problem: Problem) -> float:
