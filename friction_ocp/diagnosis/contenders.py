@@ -50,7 +50,7 @@ def to_refit(
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
     if not chosen or not current.astray:
         return with_resembling(chosen, found), []
-    outright = [item for item in found if item.augmentation.outright is not None]
+    outright = [item for item in found if item.augmentation.outright]
     if current.lost:
         first = [item for item in chosen if item.starts][:OF_LOST]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,12 +12,15 @@ import numpy as np
 import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.execution.effort import uncounted
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 linalg: Any = _linalg  # its own types are incomplete
 
 HELD = (0.0, 1e-12, 1e-9, 1e-6, 1.0)
 """Added in turn to a unit diagonal that rounding has left without factors; with the last one there are some."""
+MOST_KEPT = 2e9
+"""Bytes of linearised programs that are kept in a process; what was longest not asked for is laid again when it is."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +90,14 @@ class LinearRecording:
         _, self.slope = program.space.numbers_and_slope(point.theta, self.item.name)
         self._factor()
         gaps, starts = program.gap_errors(index, point, self.end), program.start_errors(index, point)
-        self.raw = self._stack(errors * self.scaling * self.noise, gaps, starts)
+        raw = self._stack(errors * self.scaling * self.noise, gaps, starts)
         by_theta = result.dy[:, :, self.states :] @ self.slope * self.scaling[:, :, None]
         end_theta = result.dend[:-1, :, self.states :] @ self.slope
         columns = self._stack_columns(by_theta, end_theta, self._start_slopes(program, point))
-        self.direct = columns + self._measured_slopes(program, point)
-        self.jacobian = self.reduced(self.direct)
-        self.residual = self.reduced(self.raw[:, None])[:, 0]
+        direct = columns + self._measured_slopes(program, point)
+        self.following = self._following(direct)
+        self.jacobian = self._followed(direct, self.following)
+        self.residual = self.reduced(raw[:, None])[:, 0]
 
     def _start_slopes(self, program: Program, point: Point) -> FloatArray:
         if self.cut.start_weight is None:
@@ -132,16 +138,20 @@ class LinearRecording:
 
     def moved_by(self, step: FloatArray) -> FloatArray:
         """Return (segments, states) how the nodes follow a change of the parameters."""
-        if not self.states:
-            return np.zeros((self.cut.count, 0))
-        return self._solve(-self._transposed((self.direct @ step)[:, None]))[:, :, 0]
+        return self.following @ step
 
     def reduced(self, columns: FloatArray) -> FloatArray:
         """Return columns of rows with the nodes moved to their best places."""
+        return self._followed(columns, self._following(columns))
+
+    def _following(self, columns: FloatArray) -> FloatArray:
+        """Return (segments, states, k) how far the nodes move to where changes of the rows cost least."""
         if not self.states or not columns.shape[1]:  # the motion is prescribed, or nothing is fitted
-            return columns
-        moved = self._solve(-self._transposed(columns))
-        return columns + self._applied(moved)
+            return np.zeros((self.cut.count, self.states, columns.shape[1]))
+        return self._solve(-self._transposed(columns))
+
+    def _followed(self, columns: FloatArray, moved: FloatArray) -> FloatArray:
+        return columns + self._applied(moved) if moved.size else columns
 
     def _applied(self, moved: FloatArray) -> FloatArray:
         """Return the change of all rows for moved nodes (segments, s, k)."""
@@ -245,14 +255,57 @@ def _banded_factors(diagonal: FloatArray, upper: FloatArray) -> FloatArray:
     return np.full((2 * states, count * states), np.nan)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearProgram:
-    """All recordings of a program at a point."""
+    """All recordings of a program at a point; what takes room is laid again where it was not kept."""
 
     program: Program
     point: Point
-    recordings: tuple[LinearRecording, ...]
-    rows: Rows
+
+    @property
+    def recordings(self) -> tuple[LinearRecording, ...]:
+        """The recordings."""
+        return self._laid[0]
+
+    @property
+    def rows(self) -> Rows:
+        """Their residuals, and those of static points and priors."""
+        return self._laid[1]
+
+    @property
+    def _laid(self) -> tuple[tuple[LinearRecording, ...], Rows]:
+        if _LAID not in self.__dict__:
+            with uncounted():
+                self.lay()
+        _kept.move_to_end(weakref.ref(self))
+        return self.__dict__[_LAID]
+
+    def lay(self) -> None:
+        """Linearise, and forget of others what was longest not asked for."""
+        self.__dict__[_LAID] = items, rows = _laid(self.program, self.point)
+        _keep(self, sum(map(_room, items)) + _room(rows) + rows.jacobian.nbytes)
+
+
+_LAID = "laid"
+_kept: OrderedDict[weakref.ref[LinearProgram], int] = OrderedDict()
+"""Bytes of those that are laid, the last one that was asked for at the end."""
+
+
+def _room(item: LinearRecording | Rows) -> int:
+    """Return the bytes of the arrays that something has for itself."""
+    arrays: list[FloatArray] = [value for value in vars(item).values() if isinstance(value, np.ndarray)]
+    return sum(each.nbytes for each in arrays if each.base is None)
+
+
+def _keep(linear: LinearProgram, room: int) -> None:
+    _kept[weakref.ref(linear)] = room
+    for gone in [item for item in _kept if item() is None]:
+        del _kept[gone]
+    while sum(_kept.values()) > MOST_KEPT and len(_kept) > 1:
+        oldest, _ = _kept.popitem(last=False)
+        known = oldest()
+        if known is not None:
+            del known.__dict__[_LAID]
 
 
 def _static_labels(count: int) -> tuple[FloatArray, IntArray, IntArray]:
@@ -262,7 +315,12 @@ def _static_labels(count: int) -> tuple[FloatArray, IntArray, IntArray]:
 
 def linear_program(program: Program, point: Point) -> LinearProgram:
     """Linearise a program."""
-    point = program.placed(point)
+    linear = LinearProgram(program, program.placed(point))
+    linear.lay()
+    return linear
+
+
+def _laid(program: Program, point: Point) -> tuple[tuple[LinearRecording, ...], Rows]:
     items = tuple(LinearRecording(program, index, point) for index in range(len(program.experiments)))
     labels = [item.labels() for item in items]
     space = program.space
@@ -275,6 +333,10 @@ def linear_program(program: Program, point: Point) -> LinearProgram:
     none = np.full(prior.size, -1)
     residual = np.concatenate([*(item.residual for item in items), *(seen for seen, _ in static), errors])
     jacobian = np.concatenate([*(item.jacobian for item in items), *(slope for _, slope in static), pull])
+    ends = np.cumsum([item.residual.size for item in items])
+    for item, end in zip(items, map(int, ends), strict=True):
+        own = slice(end - item.residual.size, end)
+        item.residual, item.jacobian = residual[own], jacobian[own]
     rows = Rows(
         residual=residual,
         jacobian=jacobian,
@@ -285,4 +347,4 @@ def linear_program(program: Program, point: Point) -> LinearProgram:
         pressed=space.pressed(point.theta, jacobian.T @ residual),
         static=tuple(range(len(items), len(labels))),
     )
-    return LinearProgram(program, point, items, rows)
+    return items, rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
     where most of a misfit stays, steps begin at a large effect, too. Of free runs that miss much steps begin where
-    loosely joined segments lead, too, and so they always do at a large effect that no prediction shows.
+    loosely joined segments lead, too, and so they always do at large effects that no prediction shows.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -47,9 +47,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         far = [_steps(base, model, program, eased(program, point, base.missed)) for point in away]
         ends += [timed(end, QUICK) for end in far]
     loose = [start.values(item.augmentation.off, base.values, 1.0) for start in item.starts[:1]] if base.lost else []
-    if item.augmentation.outright is not None:
-        loose.append({**base.values, **item.augmentation.outright})
-    ends += [timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK) for values in loose]
+    ends += [_led_loosely(base, model, values) for values in loose]
+    ends += _outright(base, model, item.augmentation.outright, min([end.objective for end in ends], default=np.inf))
     large, best = item.augmentation.large, min(end.objective for end in ends)
     beyond = base.objective * (1.0 - 1.0 / max(base.missed, 1.0))
     if large is not None and base.objective - best < MOST_OF * beyond:
@@ -67,8 +66,7 @@ def fitted_loosely(loose: FittedModel, item: Screened) -> float:
     """
     model = with_drive(loose.model, item.augmentation.drive)
     added = [start.added(item.augmentation.off) for start in item.starts[:1]]
-    if item.augmentation.outright is not None:
-        added.append(dict(item.augmentation.outright))
+    added += [dict(values) for values in item.augmentation.outright]
     starts = [model.space.clip(model.space.with_known({**loose.values, **values})) for values in added]
     program, point = loosely_joined(model, starts)
     return program.objective(point)
@@ -99,6 +97,23 @@ def _point(base: FittedModel, model: Model, built: Contrast, values: Mapping[str
     at = np.array([known[name] for name in built.space.names])
     tracks = built.simulate([(k, at) for k in range(len(base.linear.recordings))])
     return Point(theta, tuple(track.nodes for track in tracks))
+
+
+def _outright(
+    base: FittedModel, model: Model, begins: Sequence[Mapping[str, float]], known: float
+) -> list[FittedModel]:
+    """Fit from large effects; under a large misfit the best of them, where it comes closer than is `known`, to its end.
+
+    A few steps do not lead far where one rattles between flanks.
+    """
+    tried = begins if base.astray else begins[:1]
+    ends = [_led_loosely(base, model, {**base.values, **values}) for values in tried]
+    best = min(ends, key=lambda end: end.objective, default=None)
+    return [*ends, completed(best)] if base.astray and best is not None and best.objective < known else ends
+
+
+def _led_loosely(base: FittedModel, model: Model, values: Mapping[str, float]) -> FittedModel:
+    return timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK)
 
 
 def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:

@@ -195,9 +195,9 @@ class Augmentation:
     trials: tuple[Trial, ...]
     large: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Gives values at which a large effect may begin, from those of a small one; None where size is all that grows."""
-    outright: Mapping[str, float] | None = None
+    outright: tuple[Mapping[str, float], ...] = ()
     """Values at which a large effect may begin of which small ones tell nothing: no derivative shows a flank out of
-    reach. None where they do."""
+    reach. Empty where they do."""
     inside: tuple[str, ...] = ()
     """Paths of added parameters at whose bounds the effect is none, or another one: a fit that ends there has not found
     it."""

@@ -29,8 +29,9 @@ HARD = 0.1
 RUNG, LARGEST_PLAY = 5.0, 0.03
 """How far apart the plays are at which backlash is tried beyond the twist of the spring, and the largest one over the
 travel: flanks that are hard twist much less than they are apart."""
-OF_TWIST = 2.0 / 3.0
-"""Large play over the range of the twist: what is left of it twists the flanks."""
+OF_TWIST, NEARLY_ALL = 2.0 / 3.0, 0.9
+"""Large play over the range of the twist: what is left of it twists the flanks. Where it is nearly all of it, a model
+without play has made its spring as much softer as it takes to twist as far."""
 STAGES = (0.1, 0.3, 0.8, 2.0)
 """Twists from which a second stage is tried, over the largest one."""
 RARE = 0.01
@@ -57,7 +58,9 @@ class BacklashEffect(AbstractEffect):
         while plays[-1] * RUNG <= LARGEST_PLAY * _travel(item, clues):
             plays.append(plays[-1] * RUNG)
         added = change_transmission(drive, place, backlash=upwards(twist))
-        large = {path: OF_TWIST * _range_of_twist(item, clues)}
+        stiffness, seen = f"{place}.stiffness", _range_of_twist(item, clues)
+        harder = clues.numbers[stiffness] / (1.0 - NEARLY_ALL)
+        large = ({path: OF_TWIST * seen}, {path: NEARLY_ALL * seen, stiffness: harder})
         trials = tuple(Trial(({path: play},)) for play in plays)
         return Augmentation(added, {path: 0.0}, trials, outright=large)
 

@@ -10,15 +10,17 @@ import pytest
 import yaml
 from diagnosis_cases import VISCOUS, axis, write_case
 
+from friction_ocp.diagnosis import linear
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.blocks import blocks_of, score
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out, told
-from friction_ocp.diagnosis.linear import _banded_factors
+from friction_ocp.diagnosis.linear import _banded_factors, linear_program
 from friction_ocp.diagnosis.own_noise import with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
+from friction_ocp.execution.effort import effort
 from friction_ocp.problem_file.load import load_problem
 
 
@@ -39,6 +41,19 @@ def test_rows_give_the_normal_equations_of_the_solver(fitted: FittedModel) -> No
     )
     gradient = rows.jacobian.T @ rows.residual
     assert np.allclose(gradient / scale, reduced.gradient / scale, atol=1e-4 * np.sqrt(fitted.objective))
+
+
+def test_what_was_not_kept_is_laid_again(fitted: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is room for one linearised program alone, the other comes out the same when it is asked for."""
+    first = linear_program(fitted.linear.program, fitted.linear.point)
+    rows, moved = first.rows, first.recordings[0].moved_by(np.ones(fitted.theta.size))
+    monkeypatch.setattr(linear, "MOST_KEPT", 0)
+    other = linear_program(fitted.linear.program, fitted.linear.point)
+    before = effort()
+    assert first.rows is not rows and first.rows.jacobian.tobytes() == rows.jacobian.tobytes()
+    assert first.recordings[0].moved_by(np.ones(fitted.theta.size)).tobytes() == moved.tobytes()
+    assert effort() == before
+    assert other.rows.residual.tobytes() == rows.residual.tobytes()
 
 
 def test_innovations_of_a_right_model_are_noise(fitted: FittedModel) -> None:

@@ -182,7 +182,7 @@ def test_what_a_more_general_effect_has_is_refitted_beside_it() -> None:
 def test_what_promises_nothing_while_small_is_tried_where_a_model_has_gone_astray() -> None:
     """From where the parameters are and from the guesses; not where the model is near the recordings."""
     stiffening, play = candidate("stiffening", 1.0, gain=9.0), candidate("backlash", gain=0.0)
-    play = replace(play, augmentation=replace(play.augmentation, outright={"size": 1.0}))
+    play = replace(play, augmentation=replace(play.augmentation, outright=({"size": 1.0},)))
     guessed = candidate("asymmetry", 1.0)
 
     def screened_unfitted(keys: list[Key]) -> list[Screened]:
