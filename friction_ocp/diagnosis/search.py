@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -34,6 +35,8 @@ from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
+LONG = 300.0
+"""Seconds from which it is told beforehand how long a search may take."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
 MOST_STEPS, MOST_RUNS = 2e9, 2900.0
@@ -72,10 +75,14 @@ class Search:
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
-        base, before = self.bench.base.linear, effort()
+        base, before, began = self.bench.base.linear, effort(), time.perf_counter()
         base.program.linearise(base.point)
-        self._first, once = effort(), effort() - before
+        self._first, once, took = effort(), effort() - before, time.perf_counter() - began
         self._most = self.patience * max(MOST_STEPS, MOST_RUNS * once)
+        longest = took * self._most / max(once, 1.0)
+        if longest > LONG:
+            shorter = "`effort` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
+            self.tell(f"the search may take about {longest / 60.0:.0f} min on one processor; {shorter}", 0.0)
 
     @property
     def effort(self) -> float:
