@@ -40,7 +40,8 @@ def to_refit(
 ) -> tuple[list[Screened], list[Screened]]:
     """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
 
-    What may be large and yet promises nothing is tried wherever a model has gone astray.
+    What may be large and yet promises nothing is tried wherever a model has gone astray. From the guesses refits begin
+    where a fit is at odds with priors, too: it has gone where parameters stand in for what is missing.
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
     joined segments do, where both are judged by squares and the best is no work of chance, but for what promises most
@@ -48,8 +49,10 @@ def to_refit(
     its way, and of the two the plain one is to be preferred.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
-    if not chosen or not current.astray:
+    if not chosen or not (current.astray or current.at_odds):
         return with_resembling(chosen, found), []
+    if not current.astray:
+        return with_resembling(chosen, found), _promising(crew.screened_unfitted(keys))
     outright = [item for item in found if item.augmentation.outright]
     if current.lost:
         first = [item for item in chosen if item.starts][:OF_LOST]

@@ -19,6 +19,8 @@ from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
 STEPS_OF_NODES = 3
+AT_ODDS = 5.0
+"""Standard deviations of its prior from which a fitted value stands in for what is missing, or the prior is wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,13 @@ class FittedModel:
     def astray(self) -> bool:
         """Whether something so large is missing that the parameters that the fit has found say little."""
         return FAR < self.missed < np.inf
+
+    @property
+    def at_odds(self) -> bool:
+        """Whether the fit has moved a parameter far beyond what its prior allows."""
+        space = self.model.space
+        away = np.abs(self.theta - space.prior_mean) > AT_ODDS * space.prior_std
+        return bool(np.any(away & np.isfinite(space.prior_std)))
 
     @property
     def lost(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import COULOMB, OFF, VISCOUS, axis, write_case
+from diagnosis_cases import COULOMB, INERTIA, OFF, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.worth import innovations
@@ -62,3 +62,13 @@ def test_a_model_that_cannot_be_simulated_is_an_error(tmp_path: Path) -> None:
     drive = change_shaft(problem.drive, "motor", friction=FrictionElement(UpToASpeed(tau_c, 1.0)))
     with pytest.raises(FrictionOcpError, match=r"problem.yaml: diagnose: .*breaks down.*start from other guesses"):
         fit_base(prepare(replace(problem, drive=drive)))
+
+
+@pytest.mark.parametrize(("off", "at_odds"), [(1.0, False), (OFF, True)])
+def test_a_fit_that_has_left_its_prior_is_told_from_one_that_has_not(tmp_path: Path, off: float, at_odds: bool) -> None:
+    """An inertia that is off by 4 %, and was said to be known to a thousandth, against one that is right."""
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["inertia"] |= {"guess": off * INERTIA, "prior_std": 1e-3 * INERTIA}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    assert fit_base(prepare(load_problem(path))).at_odds == at_odds

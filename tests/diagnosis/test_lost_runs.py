@@ -180,7 +180,10 @@ def test_what_a_more_general_effect_has_is_refitted_beside_it() -> None:
 
 
 def test_what_promises_nothing_while_small_is_tried_where_a_model_has_gone_astray() -> None:
-    """From where the parameters are and from the guesses; not where the model is near the recordings."""
+    """From where the parameters are and from the guesses; not where the model is near the recordings.
+
+    There others begin at the guesses where the fit is at odds with priors.
+    """
     stiffening, play = candidate("stiffening", 1.0, gain=9.0), candidate("backlash", gain=0.0)
     play = replace(play, augmentation=replace(play.augmentation, outright=({"size": 1.0},)))
     guessed = candidate("asymmetry", 1.0)
@@ -188,12 +191,16 @@ def test_what_promises_nothing_while_small_is_tried_where_a_model_has_gone_astra
     def screened_unfitted(keys: list[Key]) -> list[Screened]:
         return [guessed]
 
-    for astray, also in ((True, [play]), (False, [])):
-        current = SimpleNamespace(lost=False, leads_loosely=False, astray=astray)
+    for astray, at_odds, also, begun in (
+        (True, False, [play], [guessed, play]),
+        (False, True, [], [guessed]),
+        (False, False, [], []),
+    ):
+        current = SimpleNamespace(lost=False, leads_loosely=False, astray=astray, at_odds=at_odds)
         crew = SimpleNamespace(bench=SimpleNamespace(current=current), screened_unfitted=screened_unfitted)
         chosen, unfitted = to_refit(cast(Any, crew), [stiffening], [stiffening, play])
         assert chosen == [stiffening, *also]
-        assert unfitted == ([guessed, play] if astray else [])
+        assert unfitted == begun
 
 
 def test_a_fit_of_loosely_joined_segments_tells_what_is_missing(bench: Bench) -> None:
