@@ -10,6 +10,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.blind_spots import BlindSpot
+from friction_ocp.diagnosis.carried import carried
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Round
 from friction_ocp.diagnosis.fitted_model import FittedModel
@@ -114,6 +115,7 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
         "components": components or ([] if diagnosis.rest is None else [diagnosis.rest]),
         "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
         "shape": None if found is None else _curve(found, diagnosis.problem.drive),
+        "joint": _joint(diagnosis, components) if diagnosis.gap else None,
         "map": [
             {
                 "component": cell.component,
@@ -130,19 +132,37 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:
     """Return the shape of what the base model lacks, on an accepted component that is a shaft, else where it shows."""
-    clues = clues_of(diagnosis.base)
+    clues, after = clues_of(diagnosis.base), clues_of(diagnosis.final) if components else None
     shafts = [shaft.name for shaft in diagnosis.problem.drive.shafts]
     rest = [] if diagnosis.rest is None else [diagnosis.rest]
     wanted = [name for name in components if name in shafts] or ([] if components else rest or shafts)
-    shapes = [found for found in (shape(clues, name) for name in wanted) if found is not None]
+    shapes = [found for found in (shape(clues, name, after) for name in wanted) if found is not None]
     return max(shapes, key=lambda found: found.share, default=None)
+
+
+def _joint(diagnosis: Diagnosis, components: list[str]) -> dict[str, Any] | None:
+    """Return what an accepted joint carries over its twist, with additions and without; None where none is accepted."""
+    drive = diagnosis.final.model.problem.drive
+    joints = [item for item in drive.transmissions if item.name in components and item.kinematic_error is None]
+    if not joints:
+        return None
+    curve = carried(clues_of(diagnosis.base), clues_of(diagnosis.final), joints[0])
+    if curve is None:
+        return None
+    motion = drive.shaft(joints[0].to_shaft).motion
+    columns = {"at": curve.twist, "needed": curve.needed, "lower": curve.lower, "upper": curve.upper}
+    columns |= {"after": curve.after} | ({} if curve.before is None else {"before": curve.before})
+    numbers = {key: [number(float(value)) for value in values] for key, values in columns.items()}
+    units = {"unit": si_unit("torque", motion), "twist_unit": si_unit("angle", motion)}
+    return {"component": curve.component, **units, **numbers}
 
 
 def _curve(found: Shape, drive: Drive) -> dict[str, Any]:
     columns = {"at": found.centre, "torque": found.torque, "lower": found.lower, "upper": found.upper}
+    columns |= {} if found.taken is None else {"taken": found.taken}
     numbers = {key: [number(float(value)) for value in values] for key, values in columns.items()}
     motion, kind = drive.shaft(found.component).motion, found.variable.rpartition(".")[2]
-    of = {"theta": "angle", "omega": "speed", "alpha": "acceleration", "torque": "torque", "time": "time"}.get(kind)
+    of = {"theta": "angle", "omega": "speed", "torque": "torque", "time": "time"}.get(kind)
     units = {"unit": si_unit("torque", motion), "variable_unit": si_unit(of, motion) if of else ""}
     return {"component": found.component, "variable": found.variable, **units, **numbers}
 

@@ -16,6 +16,7 @@ from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.stepping import state_symbols
+from friction_ocp.drive.torques import elastic_torque
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.experiment import Experiment
@@ -31,6 +32,8 @@ SMOOTHING_STEPS = 4
 FINE, MOST_FINE = 4, 3000
 """Samples in the segments that show what torque is missing as finely as recordings tell; most such segments in one."""
 
+SHARP_CORNER = 1e-6
+"""Rounding of the flanks over the play, where what a joint carries is looked at."""
 MISSED = 0.1
 """Torque that may be missing over that which moves a shaft, unless recordings need more."""
 LARGER = 3
@@ -109,8 +112,14 @@ def _watch(fitted: FittedModel) -> _Watch:
     values = [mech.shaft_angle(shaft.name, at) for shaft in shafts]
     values += [mech.shaft_speed(shaft.name, at) for shaft in shafts]
     values += [motor_torque(mech, motor, at) for motor in motors]
+    values += [
+        mech.shaft_angle(item.from_shaft, at) / item.ratio - mech.shaft_angle(item.to_shaft, at)
+        for item in mech.topology.elastic
+    ]
+    values += [elastic_torque(mech, item, at, SHARP_CORNER) for item in mech.topology.elastic]
     names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
     names += [f"{motor.name}.torque" for motor in motors]
+    names += [f"{item.name}.{kind}" for kind in ("twist", "carried") for item in mech.topology.elastic]
     u, p = column(list(mech.inputs.values())), column(list(mech.parameters.values()))
     function = ca.Function("watch", [state.x, u, p], [column(values)])
 
@@ -165,7 +174,9 @@ def _missing(fitted: FittedModel, smoother: LinearRecording, watch: _Watch) -> M
         missing[shaft.name] = torque
     nodes = watch(smoother.item, smoother.nodes, first[:-1])
     motion = {name: 0.5 * (values[1:] + values[:-1]) for name, values in nodes.items()}
-    return Missing(middle, missing, _of(mech.drive, motion, "theta"), _of(mech.drive, motion, "omega"))
+    joints = [item.name for item in mech.topology.elastic]
+    twist, torque = ({name: motion[f"{name}.{kind}"] for name in joints} for kind in ("twist", "carried"))
+    return Missing(middle, missing, _of(mech.drive, motion, "theta"), _of(mech.drive, motion, "omega"), twist, torque)
 
 
 def _smoothers(fitted: FittedModel, samples: int, size: Mapping[str, float]) -> tuple[LinearRecording, ...]:

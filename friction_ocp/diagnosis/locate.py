@@ -1,4 +1,4 @@
-"""What the missing torque depends on: the variable that explains most of it, and its shape over it."""
+"""What missing torque depends on: the variable that explains most of it, its shape, and what additions take of it."""
 
 from __future__ import annotations
 
@@ -30,17 +30,28 @@ class Shape:
     lower: FloatArray
     upper: FloatArray
     """(bins,) 95 % band of the mean."""
+    taken: FloatArray | None = None
+    """(bins,) mean of what additions take of it, N m; None where there are none, or they are not known there."""
 
 
-def shape(clues: Clues, shaft: str) -> Shape | None:
-    """Return the shape of the missing torque of a shaft; None where it is not known."""
-    torque = np.concatenate([track.missing.torque.get(shaft, np.zeros(0)) for track in clues.tracks])
+def shape(clues: Clues, shaft: str, after: Clues | None = None) -> Shape | None:
+    """Return the shape of the missing torque of a shaft; None where it is not known.
+
+    `after` are clues of the model with its additions, None where there are none.
+    """
+    torque = _missing_torque(clues, shaft)
     if torque.size < 4 * BINS or not np.any(torque):
         return None
     variables = _variables(clues, shaft)
     shares = {name: explained(values, torque) for name, values in variables.items()}
     best = max(shares, key=lambda name: shares[name])
-    return _shape(shaft, best, shares[best], variables[best], torque)
+    left = None if after is None else _missing_torque(after, shaft)
+    taken = torque - left if left is not None and left.size == torque.size else None
+    return _shape(shaft, best, shares[best], variables[best], torque, taken)
+
+
+def _missing_torque(clues: Clues, shaft: str) -> FloatArray:
+    return np.concatenate([track.missing.torque.get(shaft, np.zeros(0)) for track in clues.tracks])
 
 
 def _variables(clues: Clues, shaft: str) -> Mapping[str, FloatArray]:
@@ -78,11 +89,19 @@ def _bins(values: FloatArray) -> IntArray:
     return np.searchsorted(edges, values).astype(np.int64)
 
 
-def _shape(shaft: str, name: str, share: float, values: FloatArray, torque: FloatArray) -> Shape:
+def _shape(
+    shaft: str,
+    name: str,
+    share: float,
+    values: FloatArray,
+    torque: FloatArray,
+    taken: FloatArray | None,
+) -> Shape:
     bins = _bins(values)
     count = np.maximum(np.bincount(bins, minlength=BINS), 1)
     centre, mean = (np.bincount(bins, each, BINS) / count for each in (values, torque))
     spread = np.sqrt(np.maximum(np.bincount(bins, torque**2, BINS) / count - mean**2, 0.0) / count)
     told = np.bincount(bins, minlength=BINS) > 0
     low, high = mean - REACH * spread, mean + REACH * spread
-    return Shape(shaft, name, share, centre[told], mean[told], low[told], high[told])
+    by = None if taken is None else (np.bincount(bins, taken, BINS) / count)[told]
+    return Shape(shaft, name, share, centre[told], mean[told], low[told], high[told], by)

@@ -37,6 +37,10 @@ class Missing:
     """By shaft (segments,) rad, where it was with this torque: on its own the model may lose its way."""
     omega: Mapping[str, FloatArray]
     """By shaft (segments,) rad/s, how fast."""
+    twist: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """By elastic transmission (segments,) rad on its output side."""
+    carried: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    """By elastic transmission (segments,) N m on its output side, what its spring and damper make of that."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,9 @@ def diagnosis_figures(result: Json, before: Series, after: Series) -> Iterator[t
     found = part(result, "where").get("shape")
     if found:
         yield "shape", shape_figure(found, part(result, "where"))
+    joint = part(result, "where").get("joint")
+    if joint:
+        yield "joint", joint_figure(joint)
     for k, item in enumerate(rows(result, "rounds")):
         causes = [cause for cause in rows(item, "causes") if cause.get("refit_gain") is not None][:SHOWN]
         if causes:
@@ -68,12 +71,14 @@ def gap_map_figure(cells: Sequence[Json], changed: bool) -> Figure:
 
 
 def shape_figure(found: Json, where: Json) -> Figure:
-    """Draw the missing torque over the variable that explains most of it, with its band."""
+    """Draw the missing torque over the variable that explains most of it, its band and what additions take of it."""
     figure = new_figure(3.6)
     axes = axes_grid(figure, 1)[0][0]
     at = np.asarray(found["at"], dtype=float)
     axes.fill_between(at, found["lower"], found["upper"], color=GRID, label="95 % band of the mean")
     axes.plot(at, found["torque"], color=MEASURED, marker="o", markersize=3.5, label="missing torque")
+    if found.get("taken"):
+        axes.plot(at, found["taken"], color=SIMULATED, linewidth=1.6, label="taken by what was added")
     axes.axhline(0.0, color=MUTED, linewidth=1.0)
     share = float(part(where, "depends_on")["share"])
     axes.set_title(
@@ -82,6 +87,26 @@ def shape_figure(found: Json, where: Json) -> Figure:
     unit = unit_text(str(found.get("variable_unit", "")))
     axes.set_xlabel(f"{found['variable']} in {unit}" if unit else str(found["variable"]))
     axes.set_ylabel(f"missing torque in {unit_text(str(found.get('unit', 'SI units')))}")
+    axes.legend(loc="best")
+    return figure
+
+
+def joint_figure(found: Json) -> Figure:
+    """Draw the torque that a joint carries over its twist: as the motion needs it, and as the model has it."""
+    figure = new_figure(3.6)
+    axes = axes_grid(figure, 1)[0][0]
+    at = np.asarray(found["at"], dtype=float)
+    axes.fill_between(at, found["lower"], found["upper"], color=GRID, label="95 % band of the mean")
+    axes.plot(
+        at, found["needed"], color=MEASURED, marker="o", markersize=3.5, linewidth=0.0, label="as the motion needs it"
+    )
+    if found.get("before"):
+        axes.plot(at, found["before"], color=RESIDUAL, linewidth=1.6, label="model before")
+    axes.plot(at, found["after"], color=SIMULATED, linewidth=1.6, label="with what was added")
+    axes.axhline(0.0, color=MUTED, linewidth=1.0)
+    axes.set_title(f"What {found['component']} carries over its twist")
+    axes.set_xlabel(f"twist on the output side in {unit_text(str(found['twist_unit']))}")
+    axes.set_ylabel(f"torque in {unit_text(str(found['unit']))}")
     axes.legend(loc="best")
     return figure
 

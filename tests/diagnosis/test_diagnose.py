@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from diagnosis_cases import axis, record, write_case
+from diagnosis_cases import COULOMB, axis, record, write_case
 
 from friction_ocp.cli import main
 from friction_ocp.diagnosis.diagnose import diagnose
@@ -76,8 +77,19 @@ def test_files_for_people(stribeck: tuple[Path, dict[str, Any]]) -> None:
     folder, _ = stribeck
     assert "The model lacked stribeck at motor" in (folder / "report.html").read_text(encoding="utf-8")
     assert (folder / "result.h5").exists()
-    for name in ("gap-map", "ranking-1", "before-after-c"):
+    for name in ("gap-map", "shape", "ranking-1", "before-after-c"):
         assert (folder / "figures" / f"{name}.png").exists() and (folder / "figures" / f"{name}.svg").exists()
+
+
+def test_the_shape_is_drawn_with_what_was_added(stribeck: tuple[Path, dict[str, Any]]) -> None:
+    """Friction that the model lacks near standstill: what the effect takes of it lies in the band of its mean."""
+    _, result = stribeck
+    found = result["where"]["shape"]
+    torque, taken, low, high = (np.array(found[name]) for name in ("torque", "taken", "lower", "upper"))
+    assert found["component"] == "motor" and np.sqrt(np.mean(torque**2)) > 0.01 * COULOMB
+    assert np.sqrt(np.mean((torque - taken) ** 2)) < 0.2 * np.sqrt(np.mean(torque**2))
+    assert np.mean((taken > low) & (taken < high)) > 0.5
+    assert result["where"]["joint"] is None
 
 
 def test_a_model_that_lacks_nothing_has_no_gap(tmp_path: Path) -> None:

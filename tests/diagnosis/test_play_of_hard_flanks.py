@@ -91,3 +91,10 @@ def test_play_that_hides_behind_a_soft_spring_is_found(tmp_path: Path) -> None:
     assert accepted["parameters"]["motor-arm.backlash"]["value"] == pytest.approx(PLAY, rel=0.02)
     (spring,) = [item for item in result["biased_parameters"] if item["name"] == "motor-arm.stiffness"]
     assert spring["after"] == pytest.approx(STIFFNESS, rel=0.1) and spring["before"] < 0.1 * STIFFNESS
+    joint = result["where"]["joint"]
+    twist, needed, before, after = (np.array(joint[name]) for name in ("at", "needed", "before", "after"))
+    inside, flanks = np.abs(twist) < 0.35 * PLAY, np.abs(twist) > 0.53 * PLAY
+    assert joint["component"] == "motor-arm" and joint["unit"] == "N m" and np.sum(inside) > 5 and np.sum(flanks) > 1
+    assert np.max(np.abs(after[inside])) < 0.01 and np.max(np.abs(needed[inside])) < 0.02
+    assert np.mean(before[inside] / twist[inside]) == pytest.approx(spring["before"], rel=0.3)
+    assert needed[flanks] == pytest.approx(after[flanks], rel=0.1)
