@@ -50,7 +50,8 @@ def section(name: str, out: Path) -> str:
         if friction_ocp(["diagnose", str(problem), "--out", str(folder)]) != 0:
             raise RuntimeError(f"the diagnosis of {name} failed")
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-        figures = [folder / "figures" / "shape.png", *sorted((folder / "figures").glob("before-after-*.png"))]
+        drawn = folder / "figures"
+        figures = [drawn / "shape.png", drawn / "joint.png", *sorted(drawn.glob("before-after-*.png"))]
         out.mkdir(parents=True, exist_ok=True)
         side_by_side([path for path in figures if path.is_file()], out / f"{name}.png")
     rivals = ", ".join(f"`{rival}`" for rival in case.rivals)

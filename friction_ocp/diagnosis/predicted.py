@@ -8,10 +8,11 @@ from friction_ocp.diagnosis.bench import Bench, open_predicting
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.polishing import polished
-from friction_ocp.diagnosis.refit import completed
+from friction_ocp.diagnosis.refit import MOST_OF, completed
 from friction_ocp.diagnosis.rival import Rival, is_another
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Choice, Round
+from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.statistics.execution import Execution
 
@@ -20,18 +21,25 @@ LEAST_SHARE = 0.25
 
 
 def led_by_predictions(search: Search, run: Execution) -> Search:
-    """Look for additions by short predictions where a search found nothing; return the search that found some.
+    """Look for additions by short predictions where a search lost its way; return the search that found some.
 
+    Where lost free runs have found something, what predictions say instead counts if it takes most of what they miss.
     Free runs that come back to the recordings with these additions show what predictions cannot, and the search goes on
     with them.
     """
     patience = search.patience * max(1.0 - search.effort, LEAST_SHARE)
     other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
     other.go()
-    if not other.accepted:
+    if not other.accepted or (search.accepted and not _tells_otherwise(search, other)):
         return search
     again = _on_free_runs(search, other, run) if search.bench.base.lost else None
     return other if again is None else again
+
+
+def _tells_otherwise(search: Search, other: Search) -> bool:
+    """Whether predictions name something else than free runs did, and miss less than half of what they had missed."""
+    before, after = (innovations(model).ratio - 1.0 for model in (other.bench.base, other.bench.current))
+    return not set(search.accepted) & set(other.accepted) and after < MOST_OF * before
 
 
 def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | None:

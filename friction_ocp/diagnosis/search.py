@@ -91,9 +91,9 @@ class Search:
 
     @property
     def lost_its_way(self) -> bool:
-        """Whether nothing was added to a model so far off that its simulations lead nowhere."""
+        """Whether simulations of a model far off lead nowhere: nothing was added, or free runs stay lost with it."""
         base = self.bench.base
-        return not self.accepted and base.astray and not base.footing.predicted
+        return base.astray and not base.footing.predicted and (not self.accepted or self.bench.current.lost)
 
     def _exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""
