@@ -5,11 +5,14 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from diagnosis_cases import axis, diagnosed, write_case
 
+from friction_ocp.diagnosis import predicted
 from friction_ocp.diagnosis.base_fit import fit_base, predicting
 from friction_ocp.diagnosis.bench import open_bench, open_predicting
 from friction_ocp.diagnosis.crew import Crew
@@ -76,6 +79,29 @@ def test_they_are_asked_where_a_search_found_nothing_and_its_base_is_astray(path
     assert search.lost_its_way == base.astray
     search.accepted.append(("stribeck", "motor"))
     assert not search.lost_its_way
+
+
+@pytest.mark.parametrize(
+    ("named", "after", "counts"), [("stribeck", 1.2, True), ("stribeck", 1.8, False), ("unbalance", 1.2, False)]
+)
+def test_what_predictions_name_instead_counts_if_they_miss_little(
+    named: str, after: float, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lost free runs have found an unbalance; predictions missed as much as noise has, and miss less or as much now."""
+    monkeypatch.setattr(predicted, "innovations", lambda ratio: SimpleNamespace(ratio=ratio))
+    lost: Any = SimpleNamespace(accepted=[("unbalance", "motor")])
+    bench = SimpleNamespace(base=2.0, current=after)
+    other: Any = SimpleNamespace(accepted=[(named, "motor")], bench=bench)
+    assert predicted._tells_otherwise(lost, other) == counts
+
+
+@pytest.mark.parametrize(("accepted", "lost", "asked"), [(0, False, True), (1, False, False), (1, True, True)])
+def test_they_are_asked_where_free_runs_stay_lost(accepted: int, lost: bool, asked: bool) -> None:
+    """With what was added to a model that had gone astray."""
+    base = SimpleNamespace(astray=True, footing=SimpleNamespace(predicted=False))
+    bench = SimpleNamespace(base=base, current=SimpleNamespace(lost=lost))
+    search: Any = SimpleNamespace(bench=bench, accepted=[("stribeck", "motor")] * accepted)
+    assert Search.lost_its_way.fget(search) == asked  # pyright: ignore[reportOptionalCall]
 
 
 def test_free_runs_and_predictions_are_not_joined() -> None:
