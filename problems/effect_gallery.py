@@ -34,9 +34,9 @@ FOLDER = Path(__file__).resolve().parent / "effects"
 OPENING = """# Effects
 
 What the catalogue knows, each hidden in a drive that is simulated by other code, and named by a diagnosis of a model
-that lacks it. Left, where a torque on a shaft was missing: that torque over what explains most of it, and what was added
-takes of it; of a joint what it carries over its twist. Right: what free runs of a recording that took no part missed
-before and after.
+that lacks it. Left, where a torque on a shaft was missing: that torque over what explains most of it, and what of it
+the effect takes; of a joint what it carries over its twist. Right: what free runs of a recording that took no part
+missed before and after.
 `python problems/effect_gallery.py` makes this page.
 """
 WIDTH, COLOURS = 620, 64
