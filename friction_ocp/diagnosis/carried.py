@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friction_ocp.diagnosis.binned import band, means
 from friction_ocp.drive.parts import Transmission
 from friction_ocp.effects.effect import Clues
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 BINS, FEWEST = 24, 4
 """Intervals of the twist, and segments of which a mean is shown."""
+SIZE, WITHIN = BINS + 2, slice(1, -1)
+"""All intervals, with what is beyond at either end, and those between."""
 RARE = 0.002
 """Share of the segments at either end whose twist is not shown."""
-REACH = 1.96
 
 
 @dataclass(frozen=True)
@@ -43,23 +45,22 @@ def carried(before: Clues, after: Clues, joint: Transmission) -> Carried | None:
     missing = np.concatenate([track.missing.torque.get(joint.to_shaft, np.zeros(0)) for track in after.tracks])
     low, high = (float(end) for end in np.quantile(twist, [RARE, 1.0 - RARE]))
     edges: FloatArray = np.linspace(low, high, BINS + 1)
-    bins = _bins(twist, edges)
     needed = torque + (missing if missing.size == torque.size else 0.0)
-    count = np.maximum(np.bincount(bins, minlength=BINS + 2), 1)
-    mean = np.bincount(bins, needed, BINS + 2) / count
-    spread = np.sqrt(np.maximum(np.bincount(bins, needed**2, BINS + 2) / count - mean**2, 0.0) / count)
-    told = np.bincount(bins, minlength=BINS + 2)[1:-1] >= FEWEST
+    bins, (other, carried_before) = _bins(twist, edges), _along(before, joint.name)
+    told = _counts(bins) >= FEWEST
     if not told.any():
         return None
-    other, carried_before = _along(before, joint.name)
+    mean, low, high = (each[WITHIN][told] for each in band(bins, needed, SIZE))
+    at = _bins(other, edges)
+    seen = np.where(_counts(at) > 0, means(at, carried_before, SIZE)[WITHIN], np.nan)
     return Carried(
         component=joint.name,
         twist=0.5 * (edges[1:] + edges[:-1])[told],
-        needed=mean[1:-1][told],
-        lower=(mean - REACH * spread)[1:-1][told],
-        upper=(mean + REACH * spread)[1:-1][told],
-        after=_means(twist, torque, edges)[told],
-        before=_means(other, carried_before, edges)[told] if other.size else None,
+        needed=mean,
+        lower=low,
+        upper=high,
+        after=means(bins, torque, SIZE)[WITHIN][told],
+        before=seen[told] if other.size else None,
     )
 
 
@@ -78,7 +79,5 @@ def _bins(twist: FloatArray, edges: FloatArray) -> IntArray:
     return np.searchsorted(edges, twist).astype(np.int64)
 
 
-def _means(twist: FloatArray, torque: FloatArray, edges: FloatArray) -> FloatArray:
-    bins = _bins(twist, edges)
-    count = np.bincount(bins, minlength=edges.size + 1)[1:-1]
-    return np.where(count > 0, np.bincount(bins, torque, edges.size + 1)[1:-1] / np.maximum(count, 1), np.nan)
+def _counts(bins: IntArray) -> IntArray:
+    return np.bincount(bins, minlength=SIZE)[WITHIN]

@@ -16,7 +16,7 @@ from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Drive, Motor
 from friction_ocp.drive.stepping import state_symbols
-from friction_ocp.drive.torques import elastic_torque
+from friction_ocp.drive.torques import elastic_torque, plain_twist
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.experiment import Experiment
@@ -112,10 +112,7 @@ def _watch(fitted: FittedModel) -> _Watch:
     values = [mech.shaft_angle(shaft.name, at) for shaft in shafts]
     values += [mech.shaft_speed(shaft.name, at) for shaft in shafts]
     values += [motor_torque(mech, motor, at) for motor in motors]
-    values += [
-        mech.shaft_angle(item.from_shaft, at) / item.ratio - mech.shaft_angle(item.to_shaft, at)
-        for item in mech.topology.elastic
-    ]
+    values += [plain_twist(mech, item, at) for item in mech.topology.elastic]
     values += [elastic_torque(mech, item, at, SHARP_CORNER) for item in mech.topology.elastic]
     names = [f"{shaft.name}.{kind}" for kind in ("theta", "omega") for shaft in shafts]
     names += [f"{motor.name}.torque" for motor in motors]

@@ -49,10 +49,9 @@ def to_refit(
     its way, and of the two the plain one is to be preferred.
     """
     current, keys = crew.bench.current, list(dict.fromkeys(item.key for item in found))
-    if not chosen or not (current.astray or current.at_odds):
-        return with_resembling(chosen, found), []
-    if not current.astray:
-        return with_resembling(chosen, found), _promising(crew.screened_unfitted(keys))
+    if not chosen or not current.astray:
+        begun = _promising(crew.screened_unfitted(keys)) if chosen and current.at_odds else []
+        return with_resembling(chosen, found), begun
     outright = [item for item in found if item.augmentation.outright]
     if current.lost:
         first = [item for item in chosen if item.starts][:OF_LOST]

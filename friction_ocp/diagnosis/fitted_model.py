@@ -75,9 +75,7 @@ class FittedModel:
     @property
     def at_odds(self) -> bool:
         """Whether the fit has moved a parameter far beyond what its prior allows."""
-        space = self.model.space
-        away = np.abs(self.theta - space.prior_mean) > AT_ODDS * space.prior_std
-        return bool(np.any(away & np.isfinite(space.prior_std)))
+        return bool(np.any(np.abs(self.model.space.prior_deviations(self.theta)) > AT_ODDS))
 
     @property
     def lost(self) -> bool:

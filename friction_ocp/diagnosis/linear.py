@@ -329,7 +329,7 @@ def _laid(program: Program, point: Point) -> tuple[tuple[LinearRecording, ...], 
     prior = np.flatnonzero(np.isfinite(space.prior_std))
     pull = np.zeros((prior.size, point.theta.size))
     pull[np.arange(prior.size), prior] = 1.0 / space.prior_std[prior]
-    errors = (point.theta[prior] - space.prior_mean[prior]) / space.prior_std[prior]
+    errors = space.prior_deviations(point.theta)[prior]
     none = np.full(prior.size, -1)
     residual = np.concatenate([*(item.residual for item in items), *(seen for seen, _ in static), errors])
     jacobian = np.concatenate([*(item.jacobian for item in items), *(slope for _, slope in static), pull])

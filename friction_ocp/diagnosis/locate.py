@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friction_ocp.diagnosis.binned import band, means
 from friction_ocp.effects.effect import Clues
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 BINS = 16
 FOLDS = 5
-REACH = 1.96
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,7 @@ def _shape(
     taken: FloatArray | None,
 ) -> Shape:
     bins = _bins(values)
-    count = np.maximum(np.bincount(bins, minlength=BINS), 1)
-    centre, mean = (np.bincount(bins, each, BINS) / count for each in (values, torque))
-    spread = np.sqrt(np.maximum(np.bincount(bins, torque**2, BINS) / count - mean**2, 0.0) / count)
     told = np.bincount(bins, minlength=BINS) > 0
-    low, high = mean - REACH * spread, mean + REACH * spread
-    by = None if taken is None else (np.bincount(bins, taken, BINS) / count)[told]
-    return Shape(shaft, name, share, centre[told], mean[told], low[told], high[told], by)
+    mean, low, high = band(bins, torque, BINS)
+    by = None if taken is None else means(bins, taken, BINS)[told]
+    return Shape(shaft, name, share, means(bins, values, BINS)[told], mean[told], low[told], high[told], by)

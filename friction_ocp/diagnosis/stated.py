@@ -67,7 +67,7 @@ def _distance(fitted: FittedModel) -> FloatArray:
     or not.
     """
     space, values = fitted.model.space, fitted.values
-    distance: FloatArray = np.abs(fitted.theta - space.prior_mean) / space.prior_std
+    distance: FloatArray = np.abs(space.prior_deviations(fitted.theta))
     for k, name in enumerate(space.names):
         hung = _hung(fitted, name)
         distance[k] = min(distance[k], abs(values[name] + hung - space.prior_mean[k]) / space.prior_std[k])

@@ -44,11 +44,16 @@ def elastic_torque(mech: Mechanism, item: Transmission, motion: Motion, corner: 
     Backlash is a dead zone of the twist whose corners are rounded by `corner` times the free play; the
     damper acts while the flanks touch, the loop always.
     """
-    twist = mech.shaft_angle(item.from_shaft, motion) / item.ratio - mech.shaft_angle(item.to_shaft, motion)
+    twist = plain_twist(mech, item, motion)
     if item.kinematic_error is not None:
         twist = twist + item.kinematic_error.value(*mech.angle_passed(item.from_shaft, motion))
     rate = twist_rate(mech, item, motion, motion.v)
     return _spring_torque(item, twist, rate, corner) + _loop_torque(mech, item, motion, rate)
+
+
+def plain_twist(mech: Mechanism, item: Transmission, motion: Motion) -> Any:
+    """Return by how far the input is ahead of the output, on its side, were the ratio the same all around."""
+    return mech.shaft_angle(item.from_shaft, motion) / item.ratio - mech.shaft_angle(item.to_shaft, motion)
 
 
 def transfer(mech: Mechanism, item: Transmission, motion: Motion) -> Any:

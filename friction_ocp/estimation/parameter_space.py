@@ -53,6 +53,10 @@ class ParameterSpace:
         size = np.where(self.guess != 0, np.abs(self.guess), 0.05 * span)
         return np.where(np.isfinite(self.prior_std), np.minimum(size, 10 * self.prior_std), size)
 
+    def prior_deviations(self, theta: FloatArray) -> FloatArray:
+        """Return (parameters,) how far values are from the middle of their priors, in standard deviations."""
+        return (theta - self.prior_mean) / self.prior_std
+
     def numbers(self, theta: FloatArray, recording: str) -> FloatArray:
         """Return all numbers of the drive for a recording."""
         return self.numbers_and_slope(theta, recording)[0]

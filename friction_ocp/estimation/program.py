@@ -399,4 +399,4 @@ class Program:
 
 
 def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:
-    return 0.5 * float(np.sum(((theta - space.prior_mean) / space.prior_std) ** 2))
+    return 0.5 * float(np.sum(space.prior_deviations(theta) ** 2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +65,18 @@ EFFECTS = ("stribeck", "quadratic_drag", "asymmetry", "unbalance", "sensor_delay
 """That compete in a problem unless another catalogue is asked for."""
 
 
+def write_problem(folder: Path, make: Callable[[str, int], Recording], document: dict[str, Any], seed: int = 1) -> Path:
+    """Write recordings a and b to train, c to validate, each of a seed of its own, and the problem that has them."""
+    for k, name in enumerate("abc"):
+        write_recording(make(name, 10 * seed + k), folder / f"{name}.h5")
+    whole = {**document, "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]}}
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(whole, sort_keys=False), encoding="utf-8")
+    return path
+
+
 def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str] = EFFECTS) -> Path:
     """Write three recordings and a problem whose model has Coulomb and viscous friction alone."""
-    for k, name in enumerate("abc"):
-        write_recording(record(plant, name, 10 * seed + k), folder / f"{name}.h5")
     document = {
         "format": "friction-ocp-problem/1",
         "drive": plain_drive(VISCOUS),
@@ -76,12 +84,9 @@ def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str]
             "current": {"measures": "motor.current", "role": "input", "hold": "zero", "noise_std": CURRENT_NOISE},
             "position": {"measures": "motor.theta", "resolution": plant.sensors[0].resolution},
         },
-        "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
         "diagnosis": {"effects": list(effects)},
     }
-    path = folder / "problem.yaml"
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    return path
+    return write_problem(folder, lambda name, number: record(plant, name, number), document, seed)
 
 
 def diagnosed(path: Path) -> dict[str, Any]:

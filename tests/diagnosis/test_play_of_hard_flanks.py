@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
-from diagnosis_cases import diagnosed
+from diagnosis_cases import diagnosed, write_problem
 from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission, Trajectory
 
-from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
 RATIO, STIFFNESS, DAMPING, PLAY = 20.0, 1350.0, 5.0, 0.0105
@@ -51,7 +49,7 @@ def record(name: str, seed: int) -> Recording:
     return Recording(name, {key: Channel(key, *run.channels[key], unit) for key, unit in UNITS.items()})
 
 
-def document() -> dict[str, object]:
+def document() -> dict[str, Any]:
     """Return a problem whose model has no play, and whose spring nobody knows."""
 
     def shaft(name: str, inertia: float, coulomb: float, viscous: float) -> dict[str, Any]:
@@ -72,7 +70,6 @@ def document() -> dict[str, object]:
             "position": {"measures": "motor.theta", "resolution": MOTOR_STEP},
             "load_position": {"measures": "arm.theta", "resolution": LOAD_STEP},
         },
-        "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
         "diagnosis": {"effects": ["backlash", "transmission_hysteresis", "parameter_error", "sensor_delay"]},
     }
 
@@ -80,11 +77,7 @@ def document() -> dict[str, object]:
 @pytest.mark.slow
 def test_play_that_hides_behind_a_soft_spring_is_found(tmp_path: Path) -> None:
     """Neither a loop of the gear nor a torque constant that is off is taken for it, and the flanks come out hard."""
-    for k, name in enumerate("abc"):
-        write_recording(record(name, 10 + k), tmp_path / f"{name}.h5")
-    path = tmp_path / "problem.yaml"
-    path.write_text(yaml.safe_dump(document(), sort_keys=False), encoding="utf-8")
-    result = diagnosed(path)
+    result = diagnosed(write_problem(tmp_path, record, document()))
     (accepted,) = result["accepted"]
     assert result["verdict"] == "explained"
     assert (accepted["effect"], accepted["component"]) == ("backlash", "motor-arm")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-import yaml
-from diagnosis_cases import diagnosed
+from diagnosis_cases import diagnosed, write_problem
 from plant import (
     Plant,
     PlantController,
@@ -19,7 +19,6 @@ from plant import (
     Trajectory,
 )
 
-from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording
 
 RATIO, STIFFNESS, DAMPING, PLAY = 1200.0, 6e7, 1.2e5, 4e-4
@@ -61,7 +60,7 @@ def record(name: str, seed: int) -> Recording:
     return Recording(name, found)
 
 
-def document() -> dict[str, object]:
+def document() -> dict[str, Any]:
     """Return a problem whose model has no play; its numbers are those of a handbook, a little off."""
 
     def friction(coulomb: float, viscous: float) -> dict[str, object]:
@@ -85,7 +84,6 @@ def document() -> dict[str, object]:
             "motor_position": {"measures": "motor.theta", "resolution": float(MOTOR_STEP)},
             "load_position": {"measures": "load.theta", "resolution": LOAD_STEP},
         },
-        "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
         "diagnosis": {"effects": ["backlash", "transmission_hysteresis", "stiffening", "sensor_delay"]},
     }
 
@@ -93,11 +91,7 @@ def document() -> dict[str, object]:
 @pytest.mark.slow
 def test_play_is_found_where_no_small_play_predicts_it(tmp_path: Path) -> None:
     """The base model's spring has gone soft; the play comes out to a hundredth, and the spring hard again."""
-    for k, name in enumerate("abc"):
-        write_recording(record(name, 10 + k), tmp_path / f"{name}.h5")
-    path = tmp_path / "problem.yaml"
-    path.write_text(yaml.safe_dump(document(), sort_keys=False), encoding="utf-8")
-    result = diagnosed(path)
+    result = diagnosed(write_problem(tmp_path, record, document()))
     (accepted,) = result["accepted"]
     assert (accepted["effect"], accepted["component"]) == ("backlash", "motor-load")
     assert accepted["parameters"]["motor-load.backlash"]["value"] == pytest.approx(PLAY, rel=0.01)

@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Channel
 from friction_ocp.errors import Finding
+from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
 from friction_ocp.quantities import si_unit
@@ -81,7 +82,7 @@ def rounding_is_the_noise(case: Case) -> Iterator[Finding]:
         records = _records(case, channel)
         seen = [high_frequency_noise(item.time, item.values) for item in records]
         known = [value for value in seen if np.isfinite(value)]
-        rounding = channel.resolution / np.sqrt(12.0)
+        rounding = noise_floor(channel, []).std
         if not known or min(known) <= _MORE * rounding:
             continue
         unit, scatter = records[0].unit, float(np.median(known))
