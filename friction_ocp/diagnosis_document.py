@@ -112,7 +112,7 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     components = list(dict.fromkeys(component for _, component in diagnosis.accepted))
     found = _shape(diagnosis, components) if diagnosis.gap else None
     return {
-        "components": components or ([] if diagnosis.rest is None else [diagnosis.rest]),
+        "components": _possible(diagnosis, components) or ([] if diagnosis.rest is None else [diagnosis.rest]),
         "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
         "shape": None if found is None else _curve(found, diagnosis.problem.drive),
         "joint": _joint(diagnosis, components) if diagnosis.gap else None,
@@ -128,6 +128,12 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
             for cell in cells
         ],
     }
+
+
+def _possible(diagnosis: Diagnosis, components: list[str]) -> list[str]:
+    """Return accepted components, and those at which an accepted effect would be one and the same to all sensors."""
+    elsewhere = [place for keys in diagnosis.same for effect, place in keys[1:] if effect == keys[0][0]]
+    return list(dict.fromkeys([*components, *elsewhere]))
 
 
 def _shape(diagnosis: Diagnosis, components: list[str]) -> Shape | None:

@@ -11,7 +11,7 @@ from friction_ocp.diagnosis.blocks import Blocks, blocks_of
 from friction_ocp.diagnosis.easing import FAR, missed
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import LinearProgram
-from friction_ocp.diagnosis.own_noise import with_own_noise
+from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.execution.effort import once
@@ -98,7 +98,9 @@ class FittedModel:
         """The same with the noise that this model's own inertia would show: what models are compared by."""
         program, wider = with_own_noise(self.linear.program, self.model, self.footing, self.theta)
         point = solve_nodes(program, self.linear.point, STEPS_OF_NODES)
-        return program.objective(point) + float(sum(np.sum(part) for part in wider)) + self._unseen
+        cuts = zip(self.linear.recordings, program.segments, wider, strict=True)
+        prices = sum(float(np.sum(gap_prices(item, cut, part))) for item, cut, part in cuts)
+        return program.objective(point) + prices + self._unseen
 
     @property
     def _unseen(self) -> float:

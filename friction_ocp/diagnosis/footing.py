@@ -44,6 +44,9 @@ channel, and again in the gap behind: with as much as the channel's own, slow to
 are."""
 NUMERICAL_INPUT = 1e-3
 """Error of a measured input over its rms, sample by sample, that a simulation between samples makes anyway."""
+MORE_THAN_ALL = 1.2
+"""What high frequencies tell of noise, over the rms of all that was measured, above which it is no noise: white noise
+alone tells 1, give or take what chance does to few samples."""
 SMOOTH = 4.0 * np.sqrt(6.0)
 """Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
 NEGLIGIBLE_GAP = 0.1
@@ -168,12 +171,16 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
 
 
 def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
-    """Return the noise floor of an input and its sampling interval."""
+    """Return the noise floor of an input and its sampling interval.
+
+    High frequencies of an input that a loop throws from one end to the other, sample by sample, are its motion.
+    """
     signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
     step = float(np.median(np.diff(signals[0].time)))
     size = max(float(np.sqrt(np.nanmean(item.values**2))) for item in signals)
-    floor = noise_floor(channel, [(item.time, item.values) for item in signals]).std
-    return max(floor, NUMERICAL_INPUT * size), step
+    floor = noise_floor(channel, [(item.time, item.values) for item in signals])
+    known = 0.0 if floor.source == "high_frequency" and floor.std > MORE_THAN_ALL * size else floor.std
+    return max(known, NUMERICAL_INPUT * size), step
 
 
 def group_inertias(mech: Mechanism, numbers: Mapping[str, float]) -> FloatArray:

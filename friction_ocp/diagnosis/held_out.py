@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
 from friction_ocp.diagnosis.kinks import around_kinks
-from friction_ocp.diagnosis.own_noise import with_own_noise
+from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.nodes import solve_nodes
@@ -49,7 +49,8 @@ def held_out(fitted: FittedModel) -> FloatArray:
             alone, (wider,) = with_own_noise(_only(program, k), fitted.model, fitted.footing, theta)
             nodes = item.nodes + item.moved_by(theta - fitted.theta)
             point = solve_nodes(alone, Point(theta, (nodes,)), STEPS_OF_NODES)
-            costs[k] = told(raw_costs(alone, point, wider))
+            prices = gap_prices(item, alone.segments[0], wider)
+            costs[k] = told(raw_costs(alone, point, prices))
     found = [costs[k] for k in range(len(program.experiments))]
     found += [_held_out_points(fitted, k) for k in range(len(program.static))]
     return np.concatenate([*found, np.zeros(fitted.linear.rows.residual.size - sum(cost.size for cost in found))])
@@ -146,15 +147,15 @@ def _some(program: Program, indices: Sequence[int]) -> Program:
     )
 
 
-def raw_costs(program: Program, point: Point, wider: FloatArray) -> FloatArray:
+def raw_costs(program: Program, point: Point, prices: FloatArray) -> FloatArray:
     """Return (rows,) half the squares of all residuals of a program of one recording, in the order of `Rows`.
 
-    `wider` (gaps,) is what the width of a gap costs beside its residuals.
+    `prices` (gaps,) are what the width of a gap costs beside its residuals.
     """
     result = program.simulate(0, point)
     samples = program.loss.cost(program.sample_errors(0, result.y)) + program.lost_costs(0)
     gaps, starts = program.gap_errors(0, point, result.end), program.start_errors(0, point)
-    widths = wider[:, None] / gaps.shape[1]
+    widths = prices[:, None] / gaps.shape[1]
     return np.concatenate([samples.ravel(), (0.5 * gaps**2 + widths).ravel(), 0.5 * starts.ravel() ** 2])
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.execution.effort import uncounted
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
@@ -191,7 +192,19 @@ class LinearRecording:
 
     def _factor(self) -> None:
         """Factorise the block-tridiagonal normal matrix of the nodes."""
-        count, states, cut = self.cut.count, self.states, self.cut
+        self.scale, self.factors = self._factors(self.cut)
+
+    def nodes_told(self, cut: Segments) -> float:
+        """Return the log-determinant of the information about the nodes with the gaps of some segments."""
+        if not self.states:
+            return 0.0
+        scale, factors = self._factors(cut)
+        diagonal = factors.reshape(2 * self.states, -1)[0]
+        return 2.0 * float(np.sum(np.log(diagonal)) - np.sum(np.log(scale[cut.measured :])))
+
+    def _factors(self, cut: Segments) -> tuple[FloatArray, FloatArray]:
+        """Return (segments, states) scales of the nodes, and the Cholesky factors of their scaled normal matrix."""
+        count, states = cut.count, self.states
         seen = np.where(self.seen[:, :, None], self.dy, 0.0)
         diagonal = np.add.reduceat(np.einsum("noi,noj->nij", seen, seen), cut.first[:-1], axis=0)
         upper = np.zeros((max(count - 1, 0), states, states))
@@ -205,12 +218,12 @@ class LinearRecording:
                 diagonal[j] += np.diag(cut.start_weight[j] ** 2)
         index = np.arange(int(states))
         diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
-        self.scale = 1.0 / np.sqrt(diagonal[:, index, index])
-        diagonal = diagonal * self.scale[:, :, None] * self.scale[:, None, :]
-        upper = upper * self.scale[:-1, :, None] * self.scale[1:, None, :]
+        scale = 1.0 / np.sqrt(diagonal[:, index, index])
+        diagonal = diagonal * scale[:, :, None] * scale[:, None, :]
+        upper = upper * scale[:-1, :, None] * scale[1:, None, :]
         diagonal[: cut.measured] = np.eye(states)
         upper[: cut.measured] = 0.0
-        self.factors = _banded_factors(diagonal, upper) if states else np.zeros((0, 0))
+        return scale, _banded_factors(diagonal, upper) if states else np.zeros((0, 0))
 
     def _solve(self, right: FloatArray) -> FloatArray:
         """Return (segments, s, k) node changes for a right-hand side; measured nodes do not move."""

@@ -3,6 +3,8 @@
 Fits share the weights of their gaps, so that a least-squares program compares them. But torque noise moves a heavy
 rotor less than a light one: judged by motion alone, a rotor that is too heavy, or an angle that is shown too large,
 would pay less for every torque that the model lacks. Whoever compares models asks what noise would have done in each.
+Gaps as wide as that have a price, the larger their range the less each is likely; but for as much of it as the
+recordings leave open, which is no choice of the model's (the likelihood without its nodes, Laplace's approximation).
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.footing import Footing, gap_roots, input_impulses, torque_noise
+from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.program import Program
@@ -38,6 +41,18 @@ def with_own_noise(
     pairs = zip(program.experiments, program.segments, strict=True)
     found = [_reweighed(model, foot, moving, item, cut) for item, cut in pairs]
     return replace(program, segments=tuple(cut for cut, _ in found)), tuple(price for _, price in found)
+
+
+def gap_prices(item: LinearRecording, cut: Segments, wider: FloatArray) -> FloatArray:
+    """Return (gaps,) what gaps cost a recording that are wider than those of its footing by logarithms `wider`.
+
+    `cut` has these gaps. What the recording does not tell of its nodes is as open as the gaps leave it, at no cost:
+    half the change of the log-determinant of the information about all nodes comes back, in equal parts.
+    """
+    if not wider.size:
+        return wider
+    back = 0.5 * (item.nodes_told(cut) - item.nodes_told(item.cut))
+    return wider + (back if np.isfinite(back) else 0.0) / wider.size
 
 
 def noise_moved(program: Program, model: Model, foot: Footing, theta: FloatArray) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -12,7 +13,7 @@ from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.footing import pieces, torque_noise
+from friction_ocp.diagnosis.footing import NUMERICAL_INPUT, input_noise, pieces, torque_noise
 from friction_ocp.diagnosis.gathered_noise import unit_covariances
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.gap import start_weight
@@ -89,3 +90,21 @@ def test_warmth_is_known_where_a_recording_starts(tmp_path: Path) -> None:
     assert start_weight(model, whole)[at] == pytest.approx(1e4 * usual[at])
     assert start_weight(model, later) == pytest.approx(usual)
     assert np.delete(start_weight(model, whole), at) == pytest.approx(np.delete(usual, at))
+
+
+@pytest.mark.parametrize(("thrown", "told"), [(True, NUMERICAL_INPUT), (False, 1.0)])
+def test_an_input_thrown_to_and_fro_by_its_loop_is_no_noise(thrown: bool, told: float, tmp_path: Path) -> None:
+    """A current that changes sign at every sample moves the drive; of one that is all noise all of it is noise."""
+    path = write_case(tmp_path, axis())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    del document["channels"]["current"]["noise_std"]
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    rng = np.random.default_rng(1)
+    for name in "abc":
+        with h5py.File(tmp_path / f"{name}.h5", "r+") as file:
+            current: Any = file["channels/current"]
+            size = current.shape[0]
+            current[...] = (-1.0) ** np.arange(size) if thrown else rng.standard_normal(size)
+    model = prepare(load_problem(path))
+    (channel,) = model.problem.drive.inputs
+    assert input_noise(model, channel)[0] == pytest.approx(told, rel=0.1)

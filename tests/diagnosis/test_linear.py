@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,9 +18,10 @@ from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out, told
 from friction_ocp.diagnosis.linear import _banded_factors, linear_program
-from friction_ocp.diagnosis.own_noise import with_own_noise
+from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.execution.effort import effort
 from friction_ocp.problem_file.load import load_problem
 
@@ -84,6 +86,36 @@ def test_a_heavier_rotor_is_moved_less_by_the_same_torque_noise(fitted: FittedMo
         assert np.all((ratio > 1.2) & (ratio <= 2.0))
     assert all(np.allclose(price, 0.0, atol=1e-9) for price in nothing)
     assert all(np.all((-2.0 * np.log(2.0) <= price) & (price < -np.log(1.2))) for price in prices)
+
+
+def test_gaps_cost_as_much_as_the_recording_tells_of_its_nodes(fitted: FittedModel) -> None:
+    """Wider gaps cost nothing where no sample tells of a node, all of it where samples tell all, and else between.
+
+    So it is in the likelihood with the nodes integrated out; its determinant is that of a dense matrix.
+    """
+    program, model = fitted.linear.program, fitted.model
+    lighter = fitted.theta * np.where(np.array(model.space.names) == "motor.inertia", 0.5, 1.0)
+    own, prices = with_own_noise(program, model, fitted.footing, lighter)
+    item, cut, wider = fitted.linear.recordings[0], own.segments[0], prices[0]
+    whole = float(np.sum(wider))
+    assert whole > 0.0
+    found = dict[float, float]()
+    for share in (1e-4, 1.0, 1e6):
+        seen = copy(item)
+        seen.dy = share * item.dy
+        found[share] = float(np.sum(gap_prices(seen, cut, wider)))
+        for segments in (item.cut, cut):
+            assert seen.nodes_told(segments) == pytest.approx(_dense_logdet(seen, segments), rel=1e-6)
+    assert found[1e-4] < 0.02 * whole < found[1.0] < 0.98 * whole < found[1e6] <= whole
+
+
+def _dense_logdet(item: linear.LinearRecording, cut: Segments) -> float:
+    """Return the log-determinant of the nodes' information, from the rows of one column per node state."""
+    own = copy(item)
+    own.cut = cut
+    unit = np.eye(cut.count * own.states).reshape(cut.count, own.states, -1)
+    rows = own._applied(unit)
+    return float(np.linalg.slogdet(rows.T @ rows)[1])
 
 
 def test_recordings_are_held_out_of_fits_at_bounds(tmp_path: Path) -> None:
