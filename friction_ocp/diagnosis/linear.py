@@ -198,7 +198,7 @@ class LinearRecording:
         """Return the log-determinant of the information about the nodes with the gaps of some segments."""
         if not self.states:
             return 0.0
-        scale, factors = self._factors(cut)
+        scale, factors = (self.scale, self.factors) if cut is self.cut else self._factors(cut)
         diagonal = factors.reshape(2 * self.states, -1)[0]
         return 2.0 * float(np.sum(np.log(diagonal)) - np.sum(np.log(scale[cut.measured :])))
 

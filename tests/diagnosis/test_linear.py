@@ -103,6 +103,7 @@ def test_gaps_cost_as_much_as_the_recording_tells_of_its_nodes(fitted: FittedMod
     for share in (1e-4, 1.0, 1e6):
         seen = copy(item)
         seen.dy = share * item.dy
+        seen._factor()
         found[share] = float(np.sum(gap_prices(seen, cut, wider)))
         for segments in (item.cut, cut):
             assert seen.nodes_told(segments) == pytest.approx(_dense_logdet(seen, segments), rel=1e-6)
