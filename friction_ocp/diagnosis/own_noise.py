@@ -3,8 +3,8 @@
 Fits share the weights of their gaps, so that a least-squares program compares them. But torque noise moves a heavy
 rotor less than a light one: judged by motion alone, a rotor that is too heavy, or an angle that is shown too large,
 would pay less for every torque that the model lacks. Whoever compares models asks what noise would have done in each.
-Gaps as wide as that have a price, the larger their range the less each is likely; but for as much of it as the
-recordings leave open, which is no choice of the model's (the likelihood without its nodes, Laplace's approximation).
+Wider gaps have a price: the larger their range, the less likely is each. They have none for what the recordings leave
+open anyway: it is the likelihood with the nodes integrated out that counts (Laplace's approximation).
 """
 
 from __future__ import annotations
