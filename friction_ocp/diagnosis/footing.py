@@ -10,7 +10,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from friction_ocp.diagnosis.gathered_noise import alike, motions_of, unit_covariances
+from friction_ocp.diagnosis.gathered_noise import alike, motions_of, slopes_about, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
@@ -49,6 +49,8 @@ MORE_THAN_ALL = 1.2
 alone tells 1, give or take what chance does to few samples."""
 SMOOTH = 4.0 * np.sqrt(6.0)
 """Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
+STILL_GAP, LOOSE_GAP = 1e-5, 1e-3
+"""Gap over the typical size of a state that no noise enters, and the most for a deflection."""
 NEGLIGIBLE_GAP = 0.1
 """Gap over the noise floor that stands for a state that no noise enters."""
 
@@ -209,17 +211,19 @@ def gap_roots(
     """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
 
     Torque noise makes the states wander, more so where an input jumps between two samples; states that no noise
-    enters may jump by a share of the noise floor. `moving` holds the torque noise, and the inertias that it moves,
-    where these are not those of the footing.
+    enters may jump by a share of the noise floor, and deflections by what torque noise makes of their torque.
+    `moving` holds the torque noise, and the inertias that it moves, where these are not those of the footing.
     """
     mover = foot if moving is None else moving
     spans = np.diff(item.grid.time[first])
-    still = still_gaps(model, foot, item.name, float(np.median(spans)))
+    states = len(model.drive.state_names)
     if spans.size < 2:
-        return np.zeros((0, still.size, still.size))
+        return np.zeros((0, states, states))
     numbers = _leaf_numbers(model, foot, item.name)
     distinct, motions, which = alike(spans, motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2))
-    units = unit_covariances(model, numbers, distinct, motions)
+    slopes = slopes_about(model, numbers, np.concatenate([motions, np.zeros((1, states))]))
+    units = unit_covariances(model, slopes[:-1], distinct)
+    still = still_gaps(model, foot, item.name, float(np.median(spans)), slopes[-1])
     power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
     covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
@@ -277,10 +281,22 @@ def with_cuts(first: IntArray, power: FloatArray) -> IntArray:
     return np.unique(np.concatenate([first, doubtful, doubtful + 1]).clip(0, first[-1])).astype(np.int64)
 
 
-def still_gaps(model: Model, foot: Footing, recording: str, span: float) -> FloatArray:
-    """Return (states,) how far states may jump that no noise enters: less than the channels can see."""
+def still_gaps(model: Model, foot: Footing, recording: str, span: float, slopes: FloatArray) -> FloatArray:
+    """Return (states,) how far states may jump that no noise enters: less than the channels can see.
+
+    Deflections of bristles and loops jump as far as changes the power of their torque, at typical speeds, by that of
+    torque noise over a segment: a stiffness that changes moves them all, and does so in steps as long as gaps let it.
+    `slopes` (states, states) say how the rates depend on the states at rest.
+    """
     mech = model.drive.mechanism
-    size = 1e-5 * model.state_scale
+    size = STILL_GAP * model.state_scale
+    deflected = [model.drive.state_names.index(name) for name in (*mech.bristle_names, *mech.loop_names)]
+    moved, speeds = list(mech.free_groups), len(mech.angle_groups) + np.arange(len(mech.free_groups))
+    momentum = group_inertias(mech, _known_numbers(model, foot, recording))[moved] * model.state_scale[speeds]
+    noise = np.max(momentum * group_density(model, foot, recording)[moved], initial=0.0) / np.sqrt(span)
+    for at in deflected:
+        power = max(float(np.max(momentum * np.abs(slopes[speeds, at]), initial=0.0)), 1e-300)
+        size[at] = np.clip(noise / power, size[at], LOOSE_GAP * model.state_scale[at])
     for k, channel in enumerate(mech.drive.outputs):
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal not in ("theta", "omega"):
@@ -317,6 +333,6 @@ def _typical_motion(model: Model, foot: Footing, item: Experiment) -> FloatArray
 def within(model: Model, foot: Footing, item: Experiment, seconds: float) -> FloatArray:
     """Return (outputs,) the mean variance that torque noise adds from a known start on, over some seconds."""
     numbers, motion = _leaf_numbers(model, foot, item.name), _typical_motion(model, foot, item)
-    units = unit_covariances(model, numbers, seconds * QUARTERS, motion)
+    units = unit_covariances(model, slopes_about(model, numbers, motion), seconds * QUARTERS)
     covariances: FloatArray = np.einsum("g,gsij->sij", group_density(model, foot, item.name) ** 2, units)
     return seen_variance(model.drive.mechanism, foot.numbers[item.name], covariances)

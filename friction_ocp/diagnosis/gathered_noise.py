@@ -16,17 +16,25 @@ MOVES_ALIKE = float(np.log(2.0))
 """The same for speeds and deflections, logarithms: what matters is whether bristles hold or slip."""
 
 
-def unit_covariances(model: Model, numbers: FloatArray, spans: FloatArray, at: FloatArray) -> FloatArray:
+def slopes_about(model: Model, numbers: FloatArray, at: FloatArray) -> FloatArray:
+    """Return (k, states, states) how the rates depend on the states about `at` (k, states), without dry friction.
+
+    `numbers` are those of the drive.
+    """
+    found = slopes_at(model.drive, numbers, typical_inputs(model.problem, model.drive), list(at))
+    return np.array(found).reshape(len(at), at.shape[1], at.shape[1])
+
+
+def unit_covariances(model: Model, slopes: FloatArray, spans: FloatArray) -> FloatArray:
     """Return (groups, spans, states, states) what unit acceleration noise of each group gathers over each span, s.
 
-    About the states `at` (spans, states) and without dry friction; `numbers` are those of the drive.
+    `slopes` (spans, states, states) are those of the rates over the states.
     """
     mech = model.drive.mechanism
-    slopes = np.array(slopes_at(model.drive, numbers, typical_inputs(model.problem, model.drive), list(at)))
-    power = np.zeros((len(mech.topology.roots), at.shape[1], at.shape[1]))
+    power = np.zeros((len(mech.topology.roots), *slopes.shape[1:]))
     for k, group in enumerate(mech.free_groups):
         power[group, len(mech.angle_groups) + k, len(mech.angle_groups) + k] = 1.0
-    return _gathered(slopes.reshape(spans.size, *power.shape[1:]), power, spans)
+    return _gathered(slopes, power, spans)
 
 
 def _gathered(slopes: FloatArray, power: FloatArray, spans: FloatArray) -> FloatArray:

@@ -357,6 +357,9 @@ class Search:
         known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen += displaced(self.rounds, known, chosen)
+        if power.significant(level):
+            shaped = [known[key] for key in again if key in known and known[key].augmentation.outright]
+            chosen += [item for item in shaped if item not in chosen]
         chosen, unfitted = to_refit(crew, chosen, found)
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)

@@ -1,4 +1,4 @@
-"""What a derivative cannot see: that a recording starts at rest, and the instant at which an acceleration jumps."""
+"""What a derivative cannot see: how a recording starts, and the instant at which an acceleration jumps."""
 
 from __future__ import annotations
 
@@ -26,15 +26,17 @@ RARE = 0.05
 
 
 def settled(program: Program, point: Point) -> Point:
-    """Return the point with recordings started at rest where that costs less.
+    """Return the point with recordings started at rest, or with bristles that carry nothing, where that costs less.
 
     A shaft that slides at a hundredth of a radian a second in the model, and sticks in truth, stays wrong: until it
-    stops, friction has the wrong sign, and no derivative shows that a stop would end it.
+    stops, friction has the wrong sign, and no derivative shows that a stop would end it. A spring that slips in the
+    model before it does in truth goes on slipping, and no derivative shows that it might be slack.
     """
     nodes = list(point.nodes)
     for k, cut in enumerate(program.segments):
         if cut.measured == 0:
-            nodes[k] = _settled_start(_alone(program, k), Point(point.theta, (nodes[k],))).nodes[0]
+            alone = _alone(program, k)
+            nodes[k] = _slack_start(alone, _settled_start(alone, Point(point.theta, (nodes[k],)))).nodes[0]
     return Point(point.theta, tuple(nodes))
 
 
@@ -57,6 +59,18 @@ def _settled_start(program: Program, point: Point) -> Point:
         if after < cost:
             best, cost = trial, after
     return best
+
+
+def _slack_start(program: Program, point: Point) -> Point:
+    """Return the point with bristles that carry nothing at the start of its recording, where that costs less."""
+    mech = program.drive.mechanism
+    bristles = np.array([mech.state_names.index(name) for name in mech.bristle_names], dtype=np.int64)
+    if not bristles.size:
+        return point
+    slack = point.nodes[0].copy()
+    slack[0, bristles] = 0.0
+    trial = solve_nodes(program, program.carrying(Point(point.theta, (slack,)), bristles), STEPS)
+    return trial if program.objective(trial) < program.objective(point) else point
 
 
 def _stops(program: Program) -> list[list[int]]:

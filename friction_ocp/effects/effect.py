@@ -292,7 +292,8 @@ def transmission(drive: Drive, name: str) -> Transmission:
 
 
 SHARE, SCALES = 0.5, (0.1, 0.3, 1.0, 3.0, 10.0)
-"""Share of springs beside something that relaxes, as they are tried, and their scale over that of the latter."""
+"""Share of springs beside something that relaxes, as they are tried, and their scale over that of the latter. Where
+springs alone are the truth, half of them may be better than none though a few are worse: it is begun there, too."""
 UNEQUAL = 100.0
 """What one spring carries over another at most."""
 RANGE = 1e3
@@ -313,16 +314,22 @@ Springs = TypeVar("Springs")
 
 
 def springs_beside(
-    kind: Callable[[Free, Free, Free, Free], Springs], path: str, scale: str, relaxing: Free, now: float
-) -> tuple[Springs, dict[str, float], tuple[Trial, ...]]:
-    """Return springs that slip beside something that relaxes, to be fitted, with their off values and trials.
+    kind: Callable[[Free, Free, Free, Free], Springs],
+    added: Callable[[Springs], Drive],
+    path: str,
+    scale: str,
+    relaxing: Free,
+    now: float,
+) -> Augmentation:
+    """Return the drive that has `added` springs that slip beside something that relaxes.
 
     `scale` names what both have of `relaxing`, which is `now` that of the latter.
     """
     springs = kind(Free(SHARE, 0.0, 1.0), Free(1.0, 0.0, UNEQUAL), Free(1.0, 0.0, UNEQUAL), relaxing)
     equal, carried = {f"{path}.soft": 1.0, f"{path}.stiff": 1.0}, {f"{path}.share": SHARE}
     trials = tuple(Trial((carried,), {**equal, f"{path}.{scale}": factor * now}) for factor in SCALES)
-    return springs, {f"{path}.share": 0.0}, trials
+    half = {**carried, **equal, f"{path}.{scale}": now}
+    return Augmentation(added(springs), {f"{path}.share": 0.0}, trials, outright=(half,))
 
 
 def motor_of(drive: Drive, shaft: str) -> Motor | None:

@@ -69,10 +69,12 @@ class PreslidingEffect(AbstractEffect):
             return None
         stiffness = law.bristle.sigma0
         now = clues.numbers.get(f"{stem}.sigma0", stiffness.guess)
-        springs, off, trials = springs_beside(BristleSprings, f"{stem}.springs", "stiffness", stiffness, now)
-        law = replace(law, bristle=replace(law.bristle, springs=springs))
-        added = change_shaft(drive, place, friction=replace(shaft.friction, law=law))
-        return Augmentation(added, off, trials)
+
+        def added(springs: BristleSprings) -> Drive:
+            own = replace(law, bristle=replace(law.bristle, springs=springs))
+            return change_shaft(drive, place, friction=replace(shaft.friction, law=own))
+
+        return springs_beside(BristleSprings, added, f"{stem}.springs", "stiffness", stiffness, now)
 
 
 def _breakaway(numbers: Mapping[str, float], place: str) -> float:

@@ -190,9 +190,11 @@ class TransmissionHysteresisEffect(AbstractEffect):
         if loop is None or loop.springs is not None or not isinstance(loop.twist, Free):
             return None
         path, now = f"{place}.hysteresis.springs", clues.numbers.get(f"{place}.hysteresis.twist", loop.twist.guess)
-        springs, off, trials = springs_beside(LoopSprings, path, "twist", loop.twist, now)
-        added = change_transmission(drive, place, hysteresis=replace(loop, springs=springs))
-        return Augmentation(added, off, trials)
+
+        def added(springs: LoopSprings) -> Drive:
+            return change_transmission(drive, place, hysteresis=replace(loop, springs=springs))
+
+        return springs_beside(LoopSprings, added, path, "twist", loop.twist, now)
 
 
 class KinematicErrorEffect(AbstractWaveEffect):

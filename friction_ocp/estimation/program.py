@@ -111,18 +111,27 @@ class Program:
     def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
         """Return node states from the smoothed measurement.
 
-        What that does not show is as steady motion has it, or as it follows from what is shown: whichever costs less.
+        What that does not show is as steady motion has it, or as it follows from what is shown: whichever costs less;
+        and so are bristles, which follow the travel since the last reversal.
         """
         pairs = zip(self.experiments, self.segments, strict=True)
         steady = tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
-        unseen = np.array(unseen_states(self.drive.mechanism), dtype=np.int64)
-        if not unseen.size or self.without_nodes or all(cut.count < 2 for cut in self.segments):
+        if self.without_nodes or all(cut.count < 2 for cut in self.segments):
             return steady
+        mech = self.drive.mechanism
+        unseen, bristles = unseen_states(mech), [mech.state_names.index(name) for name in mech.bristle_names]
+        sets = [np.array(sorted(each), dtype=np.int64) for each in {frozenset(unseen), frozenset((*unseen, *bristles))}]
+        ways = [self._with_followed(theta, steady, each) for each in sets if each.size]
+        return min((*ways, steady), key=lambda each: self.objective(Point(theta, each)))
+
+    def _with_followed(
+        self, theta: FloatArray, steady: tuple[FloatArray, ...], states: IntArray
+    ) -> tuple[FloatArray, ...]:
         nodes = tuple(own.copy() for own in steady)
-        for cut, own, followed in zip(self.segments, nodes, self._followed(theta, unseen), strict=True):
+        for cut, own, followed in zip(self.segments, nodes, self._followed(theta, states), strict=True):
             there = followed[cut.first[1:-1]]
-            own[1:, unseen] = np.where(np.isfinite(there), there, own[1:, unseen])
-        return min((nodes, steady), key=lambda each: self.objective(Point(theta, each)))
+            own[1:, states] = np.where(np.isfinite(there), there, own[1:, states])
+        return nodes
 
     def _followed(self, theta: FloatArray, unseen: IntArray) -> list[FloatArray]:
         """Return by recording (n, unseen) the unseen states, simulated while the others are set to what is measured."""
@@ -139,6 +148,16 @@ class Program:
             followed[request.first[1:]] = result.end[:, unseen]
             found.append(followed)
         return found
+
+    def carrying(self, point: Point, states: IntArray) -> Point:
+        """Return the point with some states as they go on from its first nodes, the others beginning anew at each."""
+        starts = self.measured_starts(point.theta)
+        requests = [self._request(k, point, start, derivatives=False) for k, (start, _) in enumerate(starts)]
+        results = self.sweep.run_many([replace(request, carried=states) for request in requests])
+        nodes = [own.copy() for own in point.nodes]
+        for own, result in zip(nodes, results, strict=True):
+            own[1:, states] = result.end[:-1, states]
+        return Point(point.theta, tuple(nodes))
 
     def suggested_point(self, theta: FloatArray) -> Point:
         """Return the parameters with the nodes that are suggested for them."""

@@ -14,7 +14,7 @@ from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.footing import NUMERICAL_INPUT, input_noise, pieces, torque_noise
-from friction_ocp.diagnosis.gathered_noise import unit_covariances
+from friction_ocp.diagnosis.gathered_noise import slopes_about, unit_covariances
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.gap import start_weight
 from friction_ocp.estimation.model import Model, prepare
@@ -39,7 +39,8 @@ def bristled(tmp_path_factory: pytest.TempPathFactory) -> Model:
 def covariance(model: Model, span: float, omega: float, bent: float) -> np.ndarray:
     """Return what unit acceleration noise gathers in angle, speed and deflection over a span, s."""
     at = np.array([[0.0, omega, bent]])
-    return unit_covariances(model, model.space.numbers(model.space.guess, "a"), np.array([span]), at)[0, 0]
+    slopes = slopes_about(model, model.space.numbers(model.space.guess, "a"), at)
+    return unit_covariances(model, slopes, np.array([span]))[0, 0]
 
 
 def test_at_rest_the_bristle_holds_the_shaft(bristled: Model) -> None:
