@@ -9,21 +9,28 @@ from typing import Any, ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, LoopSprings, SecondStage, Transmission
+from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import (
     SHARP,
     AbstractEffect,
     Augmentation,
     Clues,
     Trial,
+    change_shaft,
     change_transmission,
     springs_beside,
     transmission,
     upwards,
 )
+from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.effects.periodic import AbstractWaveEffect
+from friction_ocp.friction.static import CoulombViscous, NoFriction
 from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, is_off
 
+RUBS, PARTS = 0.05, {"tau_c": 1, "viscous": 2}
+"""Friction on the other side of a joint over the typical torque there, for its bounds; its parameters, and the power of
+the speed ratio by which they are larger behind a reducer."""
 HARD = 0.1
 """Frequency at which a drive swings on flanks of a joint that the model says is rigid, over that of the samples."""
 RUNG, LARGEST_PLAY = 5.0, 0.03
@@ -52,14 +59,14 @@ class BacklashEffect(AbstractEffect):
         return _play_of_rigid(drive, item, clues) if item.rigid else self._play(drive, item, clues)
 
     def _play(self, drive: Drive, item: Transmission, clues: Clues) -> Augmentation:
-        place, path, torque = item.name, f"{item.name}.backlash", clues.typical_torque[item.to_shaft]
-        twist = torque / max(clues.numbers[f"{place}.stiffness"], 1e-300)
+        place, path = item.name, f"{item.name}.backlash"
+        _, twist = _twist(item, clues)
         plays = [0.1 * twist, 0.5 * twist, 2.0 * twist]
         while plays[-1] * RUNG <= LARGEST_PLAY * _travel(item, clues):
             plays.append(plays[-1] * RUNG)
         added = change_transmission(drive, place, backlash=upwards(twist))
         stiffness, seen = f"{place}.stiffness", _range_of_twist(item, clues)
-        harder = clues.numbers[stiffness] / (1.0 - NEARLY_ALL)
+        harder = _stiffness(item, clues) / (1.0 - NEARLY_ALL)
         large = ({path: OF_TWIST * seen}, {path: NEARLY_ALL * seen, stiffness: harder})
         trials = tuple(Trial(({path: play},)) for play in plays)
         return Augmentation(added, {path: 0.0}, trials, outright=large)
@@ -90,7 +97,45 @@ def _play_of_rigid(drive: Drive, item: Transmission, clues: Clues) -> Augmentati
         backlash=upwards(plays[-1]),
     )
     off = {path: 0.0, f"{item.name}.stiffness": np.inf}
-    return Augmentation(added, off, tuple(Trial(({path: play},), contact) for play in plays))
+    trials = tuple(Trial(({path: play},), contact) for play in plays)
+    return _rubbing_apart(drive, item, clues, Augmentation(added, off, trials))
+
+
+def _rubbing_apart(drive: Drive, item: Transmission, clues: Clues, apart: Augmentation) -> Augmentation:
+    """Return an addition to a joint that was rigid with friction on both sides of it, tried as it is and half on each.
+
+    While a joint is rigid it makes no difference on which side of it something rubs, and a model may have all on one.
+    """
+    ends = (item.from_shaft, item.to_shaft)
+    sides = [_rigidly_joined(drive, start, item) for start in ends]
+    for name, side, others in zip(ends, sides, reversed(sides), strict=True):
+        dry = [other for other in others if is_dry(drive.shaft(other))]
+        if not dry or not all(isinstance(drive.shaft(own).friction.law, NoFriction) for own in side):
+            continue
+        torque, speed = clues.typical_torque[name], clues.typical_speed(name)
+        law = CoulombViscous(upwards(RUBS * torque), upwards(RUBS * torque / speed))
+        added = change_shaft(apart.drive, name, friction=replace(drive.shaft(name).friction, law=law))
+        off = {f"{name}.friction.{part}": 0.0 for part in PARTS}
+        half = dict(off)
+        for leaf in drive_leaves(drive):
+            shaft, _, part = leaf.path.partition(".friction.")
+            if shaft in dry and part in PARTS and isinstance(leaf.value, Free):
+                half[leaf.path] = 0.5 * clues.numbers[leaf.path]
+                faster = clues.typical_speed(shaft) / speed
+                half[f"{name}.friction.{part}"] += half[leaf.path] * faster ** PARTS[part]
+        split = [replace(trial, fixed={**trial.fixed, **half}) for trial in apart.trials]
+        apart = replace(apart, drive=added, off={**apart.off, **off}, trials=(*apart.trials, *split))
+    return apart
+
+
+def _rigidly_joined(drive: Drive, start: str, without: Transmission) -> set[str]:
+    """Return the shafts that move as one with a shaft, but for those behind a joint."""
+    found, grown = {start}, True
+    while grown:
+        ends = [{part.from_shaft, part.to_shaft} for part in drive.transmissions if part.rigid and part != without]
+        more = {name for pair in ends if pair & found for name in pair} - found
+        found, grown = found | more, bool(more)
+    return found
 
 
 def _interval(clues: Clues) -> float:
@@ -129,13 +174,19 @@ class ComplianceEffect(AbstractEffect):
         )
         tried = [*zip(springs, damping, strict=True), *((inertia * w**2, SHARP * inertia * w) for w in heard)]
         trials = tuple(Trial(({path: spring},), {f"{place}.damping": loss}, inverse=True) for spring, loss in tried)
-        return Augmentation(added, {path: np.inf}, trials)
+        return _rubbing_apart(drive, item, clues, Augmentation(added, {path: np.inf}, trials))
 
 
 def _twist(item: Transmission, clues: Clues) -> tuple[float, float]:
     """Return typical torque, N m, and twist, rad, of an elastic transmission on its output side."""
     torque = clues.typical_torque[item.to_shaft]
-    return torque, torque / max(clues.numbers[f"{item.name}.stiffness"], 1e-300)
+    return torque, torque / _stiffness(item, clues)
+
+
+def _stiffness(item: Transmission, clues: Clues) -> float:
+    """Return the stiffness of an elastic transmission; of one that a fit has lost, what twists as far as it travels."""
+    least = clues.typical_torque[item.to_shaft] / max(_travel(item, clues), 1e-300)
+    return max(clues.numbers[f"{item.name}.stiffness"], least, 1e-300)
 
 
 class StiffeningEffect(AbstractEffect):
@@ -150,7 +201,7 @@ class StiffeningEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         item, path = transmission(drive, place), f"{place}.second_stage"
-        size, largest = 0.3 * clues.numbers[f"{place}.stiffness"], 0.5 * _range_of_twist(item, clues)
+        size, largest = 0.3 * _stiffness(item, clues), 0.5 * _range_of_twist(item, clues)
         twists = [max(share * largest, 1e-300) for share in STAGES]
         stage = SecondStage(upwards(size), Free(twists[1], 0.1 * twists[0], 10.0 * twists[-1]))
         added = change_transmission(drive, place, second_stage=stage)
