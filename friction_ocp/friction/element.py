@@ -268,14 +268,17 @@ class FrictionElement:
         return [Play(*pair) for pair in zip(*springs, strict=True)]
 
     def _drag(self, omega: Any, transmitted: Any) -> Any:
-        """Return the signed part of the torque that depends on the speed alone."""
+        """Return the signed part of the torque that depends on the speed alone, straight on both sides of standstill.
+
+        The integrator takes its slope there, and an estimator the slope of that.
+        """
         if isinstance(self.law, AbstractBristleLaw):
             return self._viscous(omega, transmitted) * omega
         torques: list[Any] = []
-        for side in ("positive", "negative"):
-            law = self.law.along(side)
+        sides: tuple[tuple[Direction, float], ...] = (("positive", 1.0), ("negative", -1.0))
+        for side, sign in sides:
+            law, speed = self.law.along(side), positive_part(sign * omega)
             assert isinstance(law, AbstractMaxwellSlip)
             viscous = 0.0 if self.load is None else transmitted * self.load.along(side).viscous
-            size = smooth_abs(omega)
-            torques.append(law.drag(size) + viscous * size)
+            torques.append(law.drag(speed) + viscous * speed)
         return where(omega >= 0, torques[0], -torques[1])

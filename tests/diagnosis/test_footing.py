@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.footing import NUMERICAL_INPUT, input_noise, pieces, torque_noise
+from friction_ocp.diagnosis.footing import NUMERICAL_INPUT, footing, input_noise, pieces, still_gaps, torque_noise
 from friction_ocp.diagnosis.gathered_noise import slopes_about, unit_covariances
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.gap import start_weight
@@ -57,6 +58,20 @@ def test_where_it_slides_only_drag_does(span: float, bristled: Model) -> None:
     found, rate = covariance(bristled, span, omega, 1.5 * COULOMB / STIFFNESS), VISCOUS / INERTIA
     assert found[1, 1] == pytest.approx((1.0 - np.exp(-2.0 * rate * span)) / (2.0 * rate), rel=0.02)
     assert found[2, 2] < 1e-3 * found[0, 0] + 1e-12
+
+
+def test_a_deflection_may_jump_by_what_torque_noise_makes_of_its_torque(bristled: Model) -> None:
+    """Over a span T torque noise of density q is a torque q / sqrt(T), and that is the bristle's at rest over its
+    stiffness; it jumps by no less than other states and by no more than a share of its size."""
+    states, span, density = len(bristled.drive.state_names), 0.02, 1e-6
+    slopes = slopes_about(bristled, bristled.space.numbers(bristled.space.guess, "a"), np.zeros((1, states)))[0]
+    foot, at, scale = footing(bristled, bristled.space.guess), states - 1, bristled.state_scale[states - 1]
+    found = [
+        still_gaps(bristled, replace(foot, density={"motor": each}), "a", span, slopes)[at]
+        for each in (0.0, density, 1.0)
+    ]
+    assert found == pytest.approx([1e-5 * scale, density / np.sqrt(span) / STIFFNESS, 1e-3 * scale], rel=1e-3)
+    assert found[0] < found[1] < found[2]
 
 
 def test_noise_of_a_channel_with_a_gain_is_that_of_the_motor_over_it(bristled: Model) -> None:

@@ -24,6 +24,7 @@ def diagnosed(folder: Path, monkeypatch: pytest.MonkeyPatch, **friction: float |
     return diagnose(load_problem(write_case(folder, replace(plant, sensors=sensors))))
 
 
+@pytest.mark.slow
 def test_a_late_encoder_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = diagnosed(tmp_path, monkeypatch)
     assert found.accepted == (("sensor_delay", "position"),)

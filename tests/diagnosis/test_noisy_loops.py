@@ -31,6 +31,7 @@ def test_the_noise_of_a_loop_is_no_gap(tmp_path: Path) -> None:
     assert [item.name for item in base.drive.inputs] == ["current"]
 
 
+@pytest.mark.slow
 def test_what_a_noisy_loop_hides_is_found(tmp_path: Path) -> None:
     """An unbalance that the loop makes up for shows in the current that it asks for."""
     result = diagnosed(written(tmp_path, UNBALANCE))

@@ -34,7 +34,7 @@ def test_a_model_that_is_right_has_no_gap(tmp_path: Path) -> None:
     ("plant", "inertia", "effect"),
     [
         pytest.param(axis(law="stribeck", tau_s=1.6 * COULOMB, omega_s=3.0), INERTIA, "stribeck", id="stribeck"),
-        pytest.param(axis(), 1.3 * INERTIA, "inertia_error", id="inertia"),
+        pytest.param(axis(), 1.3 * INERTIA, "inertia_error", id="inertia", marks=pytest.mark.slow),
     ],
 )
 def test_what_is_wrong_with_it_is_found(tmp_path: Path, plant: Plant, inertia: float, effect: str) -> None:
@@ -44,6 +44,7 @@ def test_what_is_wrong_with_it_is_found(tmp_path: Path, plant: Plant, inertia: f
     assert result["verdict"] == "explained"
 
 
+@pytest.mark.slow
 def test_a_model_without_friction_is_given_some(tmp_path: Path) -> None:
     """As simulations of robots often are; and what that friction does beside, once it is there."""
     result = diagnosed(known(tmp_path, axis(law="stribeck", tau_s=1.6 * COULOMB, omega_s=3.0), rubs=False))

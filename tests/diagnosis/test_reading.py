@@ -81,6 +81,7 @@ def servo(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_held_goal_is_no_lag(tmp_path: Path) -> None:
     """A servo that follows its goal in steps has no lag that its model lacks."""
     seen = diagnose(load_problem(servo(tmp_path)))

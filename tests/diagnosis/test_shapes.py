@@ -102,7 +102,8 @@ def values_of(result: dict[str, Any]) -> dict[str, float]:
     return {name.rpartition(".")[2]: item["value"] for name, item in accepted["parameters"].items()}
 
 
-@pytest.mark.parametrize("breakaway", [1.15 * COULOMB, pytest.param(1.5 * COULOMB, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("breakaway", [1.15 * COULOMB, 1.5 * COULOMB])
 def test_another_exponent_is_no_break_of_the_slope(breakaway: float, tmp_path: Path) -> None:
     """A break comes nearer to such a curve than one of the usual exponent, be it down to the noise; neither stands in
     for it, nor stays beside it, nor is as likely."""

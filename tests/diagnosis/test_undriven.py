@@ -100,6 +100,7 @@ def test_what_to_record_next_asks_for_no_command(tmp_path: Path) -> None:
     assert "no command of a motor makes the motion" in result["next_experiment"]["text"]
 
 
+@pytest.mark.slow
 def test_bristles_are_found_where_the_angle_is_told(tmp_path: Path) -> None:
     """Nothing of the base model moves by itself then: it has no state."""
     friction = PlantFriction("dahl", tau_c=0.05, sigma0=2.0, viscous=2e-3)

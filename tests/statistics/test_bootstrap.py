@@ -34,6 +34,7 @@ def test_white_residuals_give_the_standard_errors_of_the_fit() -> None:
     assert np.all(np.diff(found.percentiles, axis=1) > 0)
 
 
+@pytest.mark.slow
 def test_blocks_are_longer_where_residuals_wander() -> None:
     """And the draws scatter as the sandwich says, not as white noise would: one of few long blocks is hardly known."""
     found = bootstrap(coloured_problem(8), DRAWS, HERE)
