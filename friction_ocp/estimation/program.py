@@ -122,11 +122,14 @@ class Program:
         unseen, bristles = unseen_states(mech), [mech.state_names.index(name) for name in mech.bristle_names]
         sets = [np.array(sorted(each), dtype=np.int64) for each in {frozenset(unseen), frozenset((*unseen, *bristles))}]
         ways = [self._with_followed(theta, steady, each) for each in sets if each.size]
+        if not ways:
+            return steady
         return min((*ways, steady), key=lambda each: self.objective(Point(theta, each)))
 
     def _with_followed(
         self, theta: FloatArray, steady: tuple[FloatArray, ...], states: IntArray
     ) -> tuple[FloatArray, ...]:
+        """Return nodes with some states as they follow from what is shown, wherever that can be simulated."""
         nodes = tuple(own.copy() for own in steady)
         for cut, own, followed in zip(self.segments, nodes, self._followed(theta, states), strict=True):
             there = followed[cut.first[1:-1]]
