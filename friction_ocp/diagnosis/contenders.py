@@ -52,11 +52,10 @@ def to_refit(
     if not chosen or not current.astray:
         begun = _promising(crew.screened_unfitted(keys)) if chosen and current.at_odds else []
         return with_resembling(chosen, found), begun
-    outright = [item for item in found if item.augmentation.outright]
     if current.lost:
         first = [item for item in chosen if item.starts][:OF_LOST]
         tried = with_resembling(beginning_at(first, _promising(crew.screened_loosely(keys))), found)
-        tried = _and(tried, outright)
+        tried = with_outright(tried, found)
         if not current.leads_loosely:
             return tried, []
         leading = _leading(tried, crew.fitted_loosely(tried), samples(current))
@@ -64,7 +63,12 @@ def to_refit(
         leading = _and(leading, [item for item in tried if item.key in most])
         return _and(leading, [item for item in tried if any(other.holds(item) for other in leading)]), []
     unfitted = _promising(crew.screened_unfitted(keys))
-    return _and(with_resembling(chosen, found, astray=True), outright), _and(unfitted, outright)
+    return with_outright(with_resembling(chosen, found, astray=True), found), with_outright(unfitted, found)
+
+
+def with_outright(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:
+    """Return chosen candidates with those of others that may begin outright, whatever they promise."""
+    return _and(chosen, [item for item in others if item.augmentation.outright])
 
 
 def _and(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:

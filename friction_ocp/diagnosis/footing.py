@@ -284,19 +284,14 @@ def with_cuts(first: IntArray, power: FloatArray) -> IntArray:
 def still_gaps(model: Model, foot: Footing, recording: str, span: float, slopes: FloatArray) -> FloatArray:
     """Return (states,) how far states may jump that no noise enters: less than the channels can see.
 
-    Deflections of bristles and loops jump as far as changes the power of their torque, at typical speeds, by that of
-    torque noise over a segment: a stiffness that changes moves them all, and does so in steps as long as gaps let it.
     `slopes` (states, states) say how the rates depend on the states at rest.
     """
     mech = model.drive.mechanism
     size = STILL_GAP * model.state_scale
-    deflected = [model.drive.state_names.index(name) for name in (*mech.bristle_names, *mech.loop_names)]
-    moved, speeds = list(mech.free_groups), len(mech.angle_groups) + np.arange(len(mech.free_groups))
-    momentum = group_inertias(mech, _known_numbers(model, foot, recording))[moved] * model.state_scale[speeds]
-    noise = np.max(momentum * group_density(model, foot, recording)[moved], initial=0.0) / np.sqrt(span)
-    for at in deflected:
-        power = max(float(np.max(momentum * np.abs(slopes[speeds, at]), initial=0.0)), 1e-300)
-        size[at] = np.clip(noise / power, size[at], LOOSE_GAP * model.state_scale[at])
+    deflected = mech.columns((*mech.bristle_names, *mech.loop_names))
+    if deflected:
+        loose = _loose_gaps(model, foot, recording, span, slopes[:, deflected])
+        size[deflected] = np.clip(loose, size[deflected], LOOSE_GAP * model.state_scale[deflected])
     for k, channel in enumerate(mech.drive.outputs):
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal not in ("theta", "omega"):
@@ -309,6 +304,20 @@ def still_gaps(model: Model, foot: Footing, recording: str, span: float, slopes:
                 at = model.drive.state_names.index(state)
                 size[at] = min(size[at], limit)
     return np.maximum(size, 1e-12 * model.state_scale)
+
+
+def _loose_gaps(model: Model, foot: Footing, recording: str, span: float, slopes: FloatArray) -> FloatArray:
+    """Return (k,) how far deflections of bristles and loops may jump, which `slopes` (states, k) show in the rates.
+
+    As far as changes the power of their torque, at typical speeds, by that of torque noise over a segment: a stiffness
+    that changes moves them all, and does so in steps as long as gaps let it.
+    """
+    mech = model.drive.mechanism
+    moved, speeds = list(mech.free_groups), len(mech.angle_groups) + np.arange(len(mech.free_groups))
+    momentum = group_inertias(mech, _known_numbers(model, foot, recording))[moved] * model.state_scale[speeds]
+    noise = np.max(momentum * group_density(model, foot, recording)[moved], initial=0.0) / np.sqrt(span)
+    power = np.max(momentum[:, None] * np.abs(slopes[speeds]), axis=0, initial=1e-300)
+    return noise / power
 
 
 def _segment_length(model: Model, foot: Footing, item: Experiment) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
 from friction_ocp.diagnosis.benchmark import beats
-from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit
+from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
@@ -358,8 +358,7 @@ class Search:
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen += displaced(self.rounds, known, chosen)
         if power.significant(level):
-            shaped = [known[key] for key in again if key in known and known[key].augmentation.outright]
-            chosen += [item for item in shaped if item not in chosen]
+            chosen = with_outright(chosen, [known[key] for key in again if key in known])
         chosen, unfitted = to_refit(crew, chosen, found)
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)

@@ -64,7 +64,7 @@ def _settled_start(program: Program, point: Point) -> Point:
 def _slack_start(program: Program, point: Point) -> Point:
     """Return the point with bristles that carry nothing at the start of its recording, where that costs less."""
     mech = program.drive.mechanism
-    bristles = np.array([mech.state_names.index(name) for name in mech.bristle_names], dtype=np.int64)
+    bristles = np.array(mech.columns(mech.bristle_names), dtype=np.int64)
     if not bristles.size:
         return point
     slack = point.nodes[0].copy()

@@ -6,6 +6,7 @@ time-stepping form with exact sticking are both made from the same expressions.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,6 +104,10 @@ class Mechanism:
     def bristle_names(self) -> tuple[str, ...]:
         """Names of the bristle states."""
         return tuple(name for shaft in self.bristles for name in deflection_names(shaft))
+
+    def columns(self, names: Iterable[str]) -> list[int]:
+        """Return the numbers of states, by their names."""
+        return [self.state_names.index(name) for name in names]
 
     def deflections(self, bristle: ca.SX) -> dict[str, Any]:
         """Return the bristle states by shaft: (1,), or a column where a shaft has several."""

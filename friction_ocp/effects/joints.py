@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, LoopSprings, SecondStage, Transmission
+from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import (
     SHARP,
@@ -106,8 +107,8 @@ def _rubbing_apart(drive: Drive, item: Transmission, clues: Clues, apart: Augmen
 
     While a joint is rigid it makes no difference on which side of it something rubs, and a model may have all on one.
     """
-    ends = (item.from_shaft, item.to_shaft)
-    sides = [_rigidly_joined(drive, start, item) for start in ends]
+    ends, joints = (item.from_shaft, item.to_shaft), topology(apart.drive)
+    sides = [joints.members(joints.group_of[name]) for name in ends]
     for name, side, others in zip(ends, sides, reversed(sides), strict=True):
         dry = [other for other in others if is_dry(drive.shaft(other))]
         if not dry or not all(isinstance(drive.shaft(own).friction.law, NoFriction) for own in side):
@@ -126,16 +127,6 @@ def _rubbing_apart(drive: Drive, item: Transmission, clues: Clues, apart: Augmen
         split = [replace(trial, fixed={**trial.fixed, **half}) for trial in apart.trials]
         apart = replace(apart, drive=added, off={**apart.off, **off}, trials=(*apart.trials, *split))
     return apart
-
-
-def _rigidly_joined(drive: Drive, start: str, without: Transmission) -> set[str]:
-    """Return the shafts that move as one with a shaft, but for those behind a joint."""
-    found, grown = {start}, True
-    while grown:
-        ends = [{part.from_shaft, part.to_shaft} for part in drive.transmissions if part.rigid and part != without]
-        more = {name for pair in ends if pair & found for name in pair} - found
-        found, grown = found | more, bool(more)
-    return found
 
 
 def _interval(clues: Clues) -> float:

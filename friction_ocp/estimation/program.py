@@ -119,7 +119,7 @@ class Program:
         if self.without_nodes or all(cut.count < 2 for cut in self.segments):
             return steady
         mech = self.drive.mechanism
-        unseen, bristles = unseen_states(mech), [mech.state_names.index(name) for name in mech.bristle_names]
+        unseen, bristles = unseen_states(mech), mech.columns(mech.bristle_names)
         sets = [np.array(sorted(each), dtype=np.int64) for each in {frozenset(unseen), frozenset((*unseen, *bristles))}]
         ways = [self._with_followed(theta, steady, each) for each in sets if each.size]
         if not ways:
