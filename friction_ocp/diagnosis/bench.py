@@ -17,7 +17,7 @@ from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
-from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged
+from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged, nudged_along
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard, innovations
 from friction_ocp.drive.parts import Drive
@@ -216,8 +216,7 @@ def opened_better(bench: Bench, execution: Execution) -> Bench:
 
 
 def bettered(bench: Bench, execution: Execution) -> Bench:
-    """Return the bench of the current model where it fits better, found from the guesses or from parameters that chance
-    has changed.
+    """Return the bench of the current model where it fits better, found from the guesses or from changed parameters.
 
     Tries go on from the best one as long as they better it. There are none where much is missed: where a model that
     lacks something large ends says little.
@@ -226,7 +225,9 @@ def bettered(bench: Bench, execution: Execution) -> Bench:
     if bench.current.astray or not bench.current.theta.size:
         return bench
     for turn in range(MOST_TURNS):
-        tasks = [Task(f"nudge-{turn}-{k}", nudge, (best, turn * NUDGES + k)) for k in range(NUDGES)]
+        turns = range(turn * NUDGES, (turn + 1) * NUDGES)
+        tasks = [Task(f"nudge-{k}", nudge, (best, k)) for k in turns]
+        tasks += [Task(f"nudge-along-{k}", nudge_along, (best, k)) for k in turns]
         tasks += [Task("nudge-guesses", begin_again)] if turn == 0 else []
         shared = bench.fingerprint
         outcomes = run_tasks("looking for a better fit", tasks, bench, shared, execution.executor, execution.ledger)
@@ -240,9 +241,17 @@ def bettered(bench: Bench, execution: Execution) -> Bench:
 
 def nudge(bench: Bench, point: Json, seed: int) -> Json:
     """Fit the current model again from beside a point, its own if that is null; null where that breaks down."""
+    return _better_point(nudged(_seated(bench, point), bench.problem.estimation.seed + seed))
+
+
+def nudge_along(bench: Bench, point: Json, turn: int) -> Json:
+    """Do the same from beside it along what the recordings tell little about."""
+    return _better_point(nudged_along(_seated(bench, point), turn))
+
+
+def _seated(bench: Bench, point: Json) -> FittedModel:
     current = bench.current
-    start = current if point is None else seated(current.model, current.footing, point)
-    return _better_point(nudged(start, bench.problem.estimation.seed + seed))
+    return current if point is None else seated(current.model, current.footing, point)
 
 
 def begin_again(bench: Bench) -> Json:

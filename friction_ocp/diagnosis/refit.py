@@ -26,6 +26,10 @@ MOST_OF = 0.5
 NUDGES, NUDGE, CLOSE_BY = 2, 0.05, 1.2
 """Fits that begin again at a time, the relative change of the parameters from which they do, and their objective after
 a few steps over the known one up to which they go on."""
+ALONG = 0.1
+"""The relative change of the parameter that changes most, of those that the recordings tell least about together."""
+UNTOLD = 1e-12
+"""Share of the most that they tell up to which they tell nothing but rounding."""
 
 
 def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
@@ -140,8 +144,39 @@ def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     effect explains. Free runs of steps cut short tell no more than whether they have gone astray.
     """
     rng = np.random.default_rng(seed)
-    theta = fitted.theta * (1.0 + NUDGE * rng.standard_normal(fitted.theta.size))
-    end = polished(fitted.model, fitted.footing, theta, None, QUICK)
+    return _from_beside(fitted, NUDGE * rng.standard_normal(fitted.theta.size))
+
+
+def nudged_along(fitted: FittedModel, turn: int) -> FittedModel:
+    """Fit again from parameters changed together, in a way about which the recordings tell little; in turn, the least
+    first, both ways.
+
+    Two parameters that share an effect, such as dry friction on both sides of a joint, make a valley with kinks across
+    it: chance does not lead along it.
+    """
+    rank, back = divmod(turn, 2)
+    ways = untold_ways(fitted)
+    if not len(ways):
+        return fitted
+    return _from_beside(fitted, (-ALONG if back else ALONG) * ways[rank % len(ways)])
+
+
+def untold_ways(fitted: FittedModel) -> FloatArray:
+    """Return (ways, parameters) relative changes of parameters, the largest of each one; least told ones first.
+
+    These are eigenvectors of the information about the parameters with the nodes free, each parameter in units of its
+    value. One that is pressed against a bound stays.
+    """
+    rows = fitted.linear.rows
+    relative = np.where(rows.pressed, 0.0, rows.jacobian * fitted.theta)
+    told, ways = np.linalg.eigh(relative.T @ relative)
+    ways = ways[:, told > UNTOLD * told.max(initial=0.0)].T
+    return ways / np.abs(ways).max(axis=1, keepdims=True)
+
+
+def _from_beside(fitted: FittedModel, change: FloatArray) -> FittedModel:
+    """Fit again from relatively changed parameters."""
+    end = polished(fitted.model, fitted.footing, fitted.theta * (1.0 + change), None, QUICK)
     near = end.objective < CLOSE_BY * fitted.objective
     if not near and (end.astray or end.footing.segment_s is not None):
         return end

@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.easing import FAR
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
+from friction_ocp.diagnosis.refit import nudged_along, untold_ways
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.model import with_drive
@@ -51,6 +52,30 @@ def test_a_fit_that_is_not_the_best_is_bettered(bench: Bench) -> None:
     assert beside.current.objective > bench.current.objective + 10.0 * UNIMPORTANT
     assert bettered(beside, HERE).current.objective == pytest.approx(bench.current.objective, abs=UNIMPORTANT)
     assert bettered(bench, HERE) is bench
+
+
+def test_parameters_change_together_where_recordings_tell_little(bench: Bench) -> None:
+    """The first way costs least and every other one more, both directions of each are tried; it leads to the optimum.
+
+    A parameter pressed against its bound stays there.
+    """
+    fitted = bench.current
+    ways = untold_ways(fitted)
+    assert ways.shape == 2 * (fitted.theta.size,)
+    assert np.max(np.abs(ways), axis=1) == pytest.approx(1.0)
+    units = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    told = np.linalg.norm(fitted.linear.rows.jacobian @ (units * fitted.theta).T, axis=0)
+    assert np.all(np.diff(told) > 0.0) and told[-1] > 10.0 * told[0]
+
+    beside = moved(bench, 1.01).current
+    for turn in range(2):
+        assert nudged_along(beside, turn).objective == pytest.approx(fitted.objective, abs=UNIMPORTANT)
+
+    theta = np.where(np.arange(fitted.theta.size) == 0, fitted.model.space.lower, fitted.theta)
+    point = solve_nodes(fitted.linear.program, Point(theta, fitted.linear.point.nodes))
+    pressed = replace(fitted, linear=linear_program(fitted.linear.program, point))
+    pressed.linear.rows.pressed[0] = True
+    assert untold_ways(pressed).shape == (theta.size - 1, theta.size) and not np.any(untold_ways(pressed)[:, 0])
 
 
 def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
