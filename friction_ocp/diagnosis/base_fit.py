@@ -16,6 +16,7 @@ from friction_ocp.diagnosis.own_noise import noise_moved
 from friction_ocp.diagnosis.polishing import COARSE, WARM, loosely_joined, polished, timed
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model
@@ -109,7 +110,7 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
 
 def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
     program, theta = foot.training(model), model.space.clip(theta)
-    start = solve_nodes(program, program.suggested_point(theta))
+    start = solve_nodes(program, suggested_point(program, theta))
     return polished(model, foot, theta, start.nodes, COARSE)
 
 
@@ -125,6 +126,6 @@ def _from_rest(fitted: FittedModel) -> FittedModel:
 def _rough_answer(model: Model) -> tuple[Program, Point]:
     """Fit on loosely joined segments, from the guesses and from short predictions."""
     short = predictions(model, model.train, WIDTHS[0])
-    start = short.suggested_point(model.space.guess)
+    start = suggested_point(short, model.space.guess)
     starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
     return loosely_joined(model, starts)

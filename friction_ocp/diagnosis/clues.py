@@ -20,6 +20,7 @@ from friction_ocp.drive.torques import elastic_torque, plain_twist
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
@@ -191,7 +192,7 @@ def _smoothers(fitted: FittedModel, samples: int, size: Mapping[str, float]) -> 
     options = replace(fitted.model.problem.estimation, segment=samples, process_noise=density, estimated_noise=())
     model = replace(fitted.model, problem=replace(fitted.model.problem, estimation=options), noise_levels=())
     program = relaxed(model, items, 0.0, Squares())
-    start = program.suggested_point(fitted.theta)
+    start = suggested_point(program, fitted.theta)
     point = solve_nodes(program, start, SMOOTHING_STEPS)
     return tuple(LinearRecording(program, index, point) for index in range(len(items)))
 

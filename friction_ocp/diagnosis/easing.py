@@ -14,6 +14,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.estimation.division import cut_where_they_grow
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
@@ -59,7 +60,7 @@ def finer(model: Model, foot: Footing, starts: Sequence[FloatArray], factor: flo
     From the start, one of some parameters along the measured motion, that gaps wider by a factor lead to the best end.
     """
     program = widened(foot.training(model), factor)
-    points = [program.suggested_point(theta) for theta in starts]
+    points = [suggested_point(program, theta) for theta in starts]
     point = min((solve_gauss_newton(program, start, EASY) for start in points), key=lambda end: end.objective).point
     for _ in range(MOST_DIVISIONS):
         cut = _cut_again(foot, program, point)

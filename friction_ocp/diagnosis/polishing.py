@@ -10,6 +10,7 @@ from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.standstill import settled
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, in_time
 from friction_ocp.estimation.nodes import solve_nodes
@@ -50,7 +51,7 @@ def polished(
 
 def begun(program: Program, theta: FloatArray) -> Point:
     """Return parameters with the nodes that fit them best."""
-    point = solve_nodes(program, program.suggested_point(theta))
+    point = solve_nodes(program, suggested_point(program, theta))
     if program.without_nodes:
         return point
     return joined(program, settled(program, point))
@@ -75,7 +76,7 @@ def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program,
     is short, and leads near it.
     """
     program = relaxed(model, model.train, 0.0, Squares())
-    ends = [solve_gauss_newton(program, program.suggested_point(theta), COARSE) for theta in starts]
+    ends = [solve_gauss_newton(program, suggested_point(program, theta), COARSE) for theta in starts]
     return program, min(ends, key=lambda end: end.objective).point
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.first_nodes import carrying, suggested_nodes
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.simulation.grid import BoolArray, FloatArray
@@ -47,7 +48,7 @@ def _alone(program: Program, index: int) -> Program:
 
 def _settled_start(program: Program, point: Point) -> Point:
     best, cost = point, program.objective(point)
-    measured = program.suggested_nodes(point.theta)[0][0]
+    measured = suggested_nodes(program, point.theta)[0][0]
     for columns in _stops(program):
         if any(_moves(program, column) for column in columns):
             continue
@@ -69,7 +70,7 @@ def _slack_start(program: Program, point: Point) -> Point:
         return point
     slack = point.nodes[0].copy()
     slack[0, bristles] = 0.0
-    trial = solve_nodes(program, program.carrying(Point(point.theta, (slack,)), bristles), STEPS)
+    trial = solve_nodes(program, carrying(program, Point(point.theta, (slack,)), bristles), STEPS)
     return trial if program.objective(trial) < program.objective(point) else point
 
 

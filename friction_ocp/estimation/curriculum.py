@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.estimation.division import cut_at, divided, is_divided
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run
 from friction_ocp.estimation.model import Model, laid_for
@@ -57,7 +58,7 @@ def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:
         program = relaxed(model, taken, 0.0, Squares())
         program = cut_at(model, program, [*firsts, program.segments[-1].first])
         watch = phases.begin(f"{len(taken)} of {len(model.train)} recordings")
-        start = Point(theta, (*nodes, *program.suggested_nodes(theta)[len(nodes) :]))
+        start = Point(theta, (*nodes, *suggested_nodes(program, theta)[len(nodes) :]))
         end = solve_gauss_newton(program, start, ENTRANCE, watch)
         if not left or not is_noise(program, end):
             end, program = _renewed(model, program, end, phases)
@@ -87,7 +88,7 @@ def _renewed(model: Model, program: Program, end: Solution, phases: Phases) -> t
 def _mismatch(model: Model, item: Experiment, theta: FloatArray) -> float:
     """Return the cost of a recording over its samples where every segment starts along the measured motion."""
     program = replace(relaxed(model, (item,), 0.0, Squares()), static=())
-    cost = program.objective(program.suggested_point(theta))
+    cost = program.objective(suggested_point(program, theta))
     return cost / max(int(np.isfinite(item.measured).sum()), 1)
 
 

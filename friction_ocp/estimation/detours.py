@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
 from friction_ocp.estimation.growth import joined_at_no_cost
 from friction_ocp.estimation.horizon import longest_recording
@@ -70,7 +71,7 @@ def _restarted(fitted: Fitted) -> Point | None:
     program, best = fitted.program, fitted.solution
     if program.without_nodes or not isinstance(program.loss, Squares):
         return None
-    point = solve_nodes(program, program.suggested_point(best.point.theta))
+    point = solve_nodes(program, suggested_point(program, best.point.theta))
     return point if program.objective(point) < (1.0 - BETTER) * best.objective else None
 
 
@@ -106,10 +107,10 @@ def rejoined(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
     if all(new.count <= old.count for new, old in zip(cut.segments, program.segments, strict=True)):
         return fitted
     watch = phases.begin(f"free runs over {span:.3g} s")
-    between = solve_gauss_newton(cut, cut.suggested_point(best.point.theta), FINE, watch)
+    between = solve_gauss_newton(cut, suggested_point(cut, best.point.theta), FINE, watch)
     if joined_at_no_cost(Fitted(between, cut), fitted):
         return fitted
-    end = final_solver(model)(program, program.suggested_point(between.point.theta), limits(model), watch)
+    end = final_solver(model)(program, suggested_point(program, between.point.theta), limits(model), watch)
     iterations = best.iterations + between.iterations + end.iterations
     return replace(fitted, solution=replace(min(best, end, key=lambda item: item.objective), iterations=iterations))
 

@@ -11,6 +11,7 @@ import numpy as np
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
@@ -139,7 +140,7 @@ def identify(problem: Problem, progress: Progress = silent) -> Estimate:
 def _last_iterate(model: Model, reports: list[Report]) -> Fitted:
     program = program_builder(model)(model, 0.0, Squares())
     theta = reports[0].point.theta if reports else model.space.guess
-    point = program.suggested_point(theta)
+    point = suggested_point(program, theta)
     where = f"in phase '{reports[0].phase}', iteration {reports[0].iteration}" if reports else "before the first step"
     return Fitted(Solution(point, program.objective(point), 0, False, f"interrupted {where}"), program)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import CONDITION_INDEX, Verdict, verdicts
 from friction_ocp.estimation.model import Model
@@ -92,7 +93,7 @@ def survey(model: Model) -> Survey | None:
     views: list[View] = []
     for theta in _thetas(model.space)[: None if steps <= FEW_STEPS else 1]:
         for program in programs:
-            point = program.suggested_point(theta)
+            point = suggested_point(program, theta)
             with np.errstate(all="ignore"):
                 system = program.linearise(point)
             if np.isfinite(system.objective) and np.all(np.isfinite(system.theta_theta)):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import ParameterSpace, nested_space
@@ -112,7 +113,7 @@ def _grow(model: Model, fitted: Fitted, horizon_s: float, shares: tuple[float, .
 
 def _better_start(model: Model, program: Program, point: Point) -> Point:
     """Return the point, or the guesses where these explain more: short predictions may end in nonsense."""
-    guess = program.suggested_point(model.space.guess)
+    guess = suggested_point(program, model.space.guess)
     return min(point, guess, key=program.objective)
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.composite import solve_composite
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.parameter_space import nested_space
@@ -76,7 +77,7 @@ def _least_squares(program: Program, predicted: Solution, watch: Watch) -> Solut
 
 
 def _started(program: Program, theta: FloatArray) -> Point:
-    return program.suggested_point(theta)
+    return suggested_point(program, theta)
 
 
 def _on_grid(program: Program, end: Solution) -> FloatArray:

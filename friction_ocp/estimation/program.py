@@ -14,7 +14,6 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from friction_ocp.drive.start import unseen_states
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.normal_equations import NormalEquations
@@ -25,9 +24,6 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yardstick
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 from friction_ocp.simulation.sweep import Sweep
-
-FOLLOWED = 10
-"""Samples after which states are set to what is measured while those that no channel shows are simulated."""
 
 
 @dataclass(frozen=True)
@@ -107,64 +103,6 @@ class Program:
     def samples(self) -> int:
         """How many samples there are in all recordings."""
         return sum(int(np.isfinite(item.measured).sum()) for item in self.experiments)
-
-    def suggested_nodes(self, theta: FloatArray) -> tuple[FloatArray, ...]:
-        """Return node states from the smoothed measurement.
-
-        What that does not show is as steady motion has it, or as it follows from what is shown: whichever costs less;
-        and so are bristles, which follow the travel since the last reversal.
-        """
-        pairs = zip(self.experiments, self.segments, strict=True)
-        steady = tuple(self.measured_states(item, theta, cut.first[:-1])[0] for item, cut in pairs)
-        if self.without_nodes or all(cut.count < 2 for cut in self.segments):
-            return steady
-        mech = self.drive.mechanism
-        unseen, bristles = unseen_states(mech), mech.columns(mech.bristle_names)
-        sets = [np.array(sorted(each), dtype=np.int64) for each in {frozenset(unseen), frozenset((*unseen, *bristles))}]
-        ways = [self._with_followed(theta, steady, each) for each in sets if each.size]
-        if not ways:
-            return steady
-        return min((*ways, steady), key=lambda each: self.objective(Point(theta, each)))
-
-    def _with_followed(
-        self, theta: FloatArray, steady: tuple[FloatArray, ...], states: IntArray
-    ) -> tuple[FloatArray, ...]:
-        """Return nodes with some states as they follow from what is shown, wherever that can be simulated."""
-        nodes = tuple(own.copy() for own in steady)
-        for cut, own, followed in zip(self.segments, nodes, self._followed(theta, states), strict=True):
-            there = followed[cut.first[1:-1]]
-            own[1:, states] = np.where(np.isfinite(there), there, own[1:, states])
-        return nodes
-
-    def _followed(self, theta: FloatArray, unseen: IntArray) -> list[FloatArray]:
-        """Return by recording (n, unseen) the unseen states, simulated while the others are set to what is measured."""
-        requests = list[SweepRequest]()
-        for item, cut in zip(self.experiments, self.segments, strict=True):
-            often = np.arange(0, int(cut.first[-1]), FOLLOWED, dtype=np.int64)
-            first: IntArray = np.unique(np.concatenate([often, cut.first]))
-            numbers = self.space.numbers(theta, item.name)
-            x0 = self.sweep.start_states(item.signals(first[:-1]), numbers)
-            requests.append(SweepRequest(item.grid, first, x0, numbers, self.width, carried=unseen))
-        found = list[FloatArray]()
-        for request, result in zip(requests, self.sweep.run_many(requests), strict=True):
-            followed = np.full((request.grid.time.size, unseen.size), np.nan)
-            followed[request.first[1:]] = result.end[:, unseen]
-            found.append(followed)
-        return found
-
-    def carrying(self, point: Point, states: IntArray) -> Point:
-        """Return the point with some states as they go on from its first nodes, the others beginning anew at each."""
-        starts = self.measured_starts(point.theta)
-        requests = [self._request(k, point, start, derivatives=False) for k, (start, _) in enumerate(starts)]
-        results = self.sweep.run_many([replace(request, carried=states) for request in requests])
-        nodes = [own.copy() for own in point.nodes]
-        for own, result in zip(nodes, results, strict=True):
-            own[1:, states] = result.end[:-1, states]
-        return Point(point.theta, tuple(nodes))
-
-    def suggested_point(self, theta: FloatArray) -> Point:
-        """Return the parameters with the nodes that are suggested for them."""
-        return Point(theta, self.suggested_nodes(theta))
 
     def measured_states(self, item: Experiment, theta: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return (k, states) and its derivative (k, states, parameters) at the given grid nodes."""

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from friction_ocp.estimation.curriculum import enter_in_turn, introduced
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
@@ -141,7 +142,7 @@ def _predicted(model: Model, phases: Phases) -> FloatArray:
 def prediction(model: Model, phases: Phases) -> Fitted:
     """Fit what best predicts the smoothed motion over short times."""
     program = predictions(model, model.train, WIDTHS[0])
-    start = program.suggested_point(model.space.guess)
+    start = suggested_point(program, model.space.guess)
     return Fitted(solve_gauss_newton(program, start, COARSE, phases.begin("short predictions")), program)
 
 
@@ -151,7 +152,7 @@ def _rounds(model: Model, plan: Plan, starts: Sequence[FloatArray], name: str, p
     Return the ends, best first; the iterations of all are booked on each.
     """
     program = plan.builder(model, plan.widths[0], Squares())
-    points = [program.suggested_point(theta) for theta in starts]
+    points = [suggested_point(program, theta) for theta in starts]
     points.sort(key=lambda point: mean_error(program, point))
     rounds = max(len(plan.widths), len(roundings_of(model)))
     iterations, ends = 0, list[Solution]()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
@@ -59,7 +60,7 @@ def simulate_recordings(
         return ()
     span = horizon(model)
     program = free_run(model, experiments, width, Squares(), span)
-    point = program.suggested_point(theta)
+    point = suggested_point(program, theta)
     if not fits_free_run(model):
         point = _smoothed(model, experiments, program, point)
     elif span is None:
@@ -78,7 +79,7 @@ def simulate_recordings(
 def _smoothed(model: Model, experiments: tuple[Experiment, ...], program: Program, point: Point) -> Point:
     """Start every window from the state that the relaxed program smooths out of the measurement."""
     smoother = relaxed(model, experiments, 0.0, Squares())
-    solved = solve_nodes(smoother, smoother.suggested_point(point.theta))
+    solved = solve_nodes(smoother, suggested_point(smoother, point.theta))
     return program.point_along(smoother, solved)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.estimation.clocks import Moves, on_one_clock
+from friction_ocp.estimation.first_nodes import suggested_nodes
 from friction_ocp.estimation.model import Model, in_time, late_of, prepare, with_late, with_step
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.progress import Phases
@@ -29,7 +30,7 @@ def synchronised(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, F
             break
         model = nearer
         program = program_builder(model)(model, 0.0, fitted.program.loss)
-        start = Point(model.space.clip(theta), program.suggested_nodes(theta))
+        start = Point(model.space.clip(theta), suggested_nodes(program, theta))
         end = final_solver(model)(program, start, limits(model), phases.begin(f"clocks and delays, turn {turn + 1}"))
         fitted = Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
     return model, fitted

@@ -12,6 +12,7 @@ from friction_ocp.drive.parts import Channel, Controller, Drive, Motor
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import prepare, slowest_period
 from friction_ocp.estimation.problem import EstimationOptions, RecordingUse
 from friction_ocp.estimation.stages import free_run
@@ -98,7 +99,7 @@ def _simulated(
     options = EstimationOptions(initial_state="measured", max_step=fitted.model.max_step)
     model = prepare(replace(problem, drive=drive, train=(use,), validation=(), static=(), estimation=options))
     program = free_run(model, model.train, 0.0, Squares(), None)
-    y = program.simulate(0, program.suggested_point(model.space.guess)).y
+    y = program.simulate(0, suggested_point(program, model.space.guess)).y
     if not np.all(np.isfinite(y)):
         raise FrictionOcpError(Finding(problem.title, "the simulation breaks down", "a motion that the model can make"))
     at = model.train[0].grid.time

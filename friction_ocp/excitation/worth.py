@@ -11,6 +11,7 @@ import scipy.special as _special  # pyright: ignore[reportMissingTypeStubs]
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import LinearProgram, linear_program
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.noise import noise_floor
@@ -85,8 +86,8 @@ def _linear(fitted: FittedModel, recording: Recording) -> LinearProgram:
     foot = replace(footing(model, theta), segment_s=fitted.footing.segment_s)
     program = foot.program(model, model.train)
     freely = free_run(model, model.train, 0.0, Squares(), None)
-    alone = program.point_along(freely, freely.suggested_point(theta))
-    starts = [program.suggested_point(theta), alone]
+    alone = program.point_along(freely, suggested_point(freely, theta))
+    starts = [suggested_point(program, theta), alone]
     return linear_program(program, min((solve_nodes(program, start) for start in starts), key=program.objective))
 
 

@@ -27,6 +27,7 @@ import numpy as np
 from tracing import Curve, Trace, counted, draw
 
 from friction_ocp.estimation.estimate import identify
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Program
@@ -78,7 +79,7 @@ class FreeRun:
     def rms(self, numbers: Numbers) -> float:
         """Return the root mean square of the error of the angle, rad."""
         theta = np.array([numbers[name.rpartition(".")[2]] for name in self.model.space.names])
-        point = self.program.suggested_point(theta)
+        point = suggested_point(self.program, theta)
         errors = self.program.simulate(0, point).y[:, 0] - self.model.train[0].measured[:, 0]
         return float(np.sqrt(np.nanmean(errors**2)))
 

@@ -32,6 +32,7 @@ from tracing import Curve, Trace, counted, draw
 
 from friction_ocp.estimation.agreement import curve_distance
 from friction_ocp.estimation.estimate import identify
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.problem import Problem, RecordingUse, StaticUse
 from friction_ocp.estimation.program import Program
@@ -114,7 +115,7 @@ class GridSearch:
     def misfit(self, values: Numbers) -> float:
         """Return the distance d of eq. 15, both curves scaled to equal rms: the accelerometer's scale is unknown."""
         theta = np.array([values[name] for name in self.model.space.names])
-        point = self.program.suggested_point(theta)
+        point = suggested_point(self.program, theta)
         simulated = self.program.simulate(0, point).y[:, 0]
         scale = np.sqrt(np.mean(self.measured**2) / max(float(np.mean(simulated**2)), 1e-12))
         window = (self.time > DATA.STOP_AT - 0.05) & (self.time < DATA.STOP_AT + 3.0)
@@ -239,7 +240,7 @@ def _held_out(problem: Problem, values: Numbers) -> float:
     model = prepare(replace(problem, train=problem.validation, validation=(), static=(), static_validation=()))
     program = free_run(model, model.train, 0.0, Squares(), None)
     theta = np.array([values[name] for name in model.space.names])
-    errors = program.simulate(0, program.suggested_point(theta)).y[:, 0] - model.train[0].measured[:, 0]
+    errors = program.simulate(0, suggested_point(program, theta)).y[:, 0] - model.train[0].measured[:, 0]
     return float(np.sqrt(np.nanmean(errors**2)))
 
 

@@ -27,6 +27,7 @@ from checks import print_rows
 from peer_cases import CASES, SERVO, Case
 from xl330_cmaes import FreeRunError
 
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run
@@ -128,7 +129,7 @@ def judged(case: Case, found: Measured) -> Measured:
         return replace(found, merit=errors[0], validation=errors[1])
     pinned = replace(model, space=replace(model.space, guess=theta, lower=theta, upper=theta))
     program = relaxed(pinned, model.train, 0.0, Squares())
-    end = solve_gauss_newton(program, program.suggested_point(theta))
+    end = solve_gauss_newton(program, suggested_point(program, theta))
     worst = np.nan
     if case.reference is not None:
         own = np.array([found.values[name] for name in case.names])

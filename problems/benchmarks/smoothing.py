@@ -24,6 +24,7 @@ from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Tra
 from friction_ocp.drive.parts import Channel as Sensor
 from friction_ocp.drive.parts import Drive, Motor, Shaft
 from friction_ocp.estimation.estimate import Estimate, identify
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.model import prepare
@@ -102,7 +103,7 @@ def smoothed(problem: Problem, answer: Estimate) -> list[Smoothed]:
     found: list[Smoothed] = []
     for width in WIDTHS:
         program = free_run(model, model.train, width, Squares(), horizon(model))
-        end = solve_gauss_newton(program, program.suggested_point(theta), TIGHT).point
+        end = solve_gauss_newton(program, suggested_point(program, theta), TIGHT).point
         residual = program.residuals(0, program.simulate(0, end).y)[:, 0]
         seen = np.isfinite(residual)
         found.append(Smoothed(width, end.theta, whiteness(model.train[0].grid.time[seen], residual[seen]).p_value))

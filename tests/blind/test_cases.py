@@ -21,6 +21,7 @@ from blind.site import Site
 from blind.visibility import Excited, View, size_for
 
 import friction_ocp as fo
+from friction_ocp.estimation.first_nodes import suggested_nodes
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import free_run
@@ -42,7 +43,7 @@ def free_run_ratios(path: Path) -> np.ndarray:
     """Return the noise ratio of each channel, free running from rest."""
     model = prepare(fo.load_problem(path))
     program = free_run(model, model.train, 0.0, Squares(), None)
-    nodes = program.suggested_nodes(model.space.guess)
+    nodes = suggested_nodes(program, model.space.guess)
     point = Point(model.space.guess, tuple(np.zeros_like(item) for item in nodes))
     error = program.simulate(0, point).y - model.train[0].measured
     return np.sqrt(np.nanmean(error**2, axis=0)) / model.noise

@@ -19,6 +19,7 @@ from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.refit import nudged_along, untold_ways
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
@@ -89,7 +90,7 @@ def test_a_fit_that_is_astray_is_left_to_the_guesses(bench: Bench) -> None:
     known = {"motor.gravity.torque": 0.012, "motor.gravity.phase": 0.4}
     theta = model.space.with_known({name: 1.3 * value for name, value in bench.current.values.items()} | known)
     program = bench.base.footing.training(model)
-    at = program.suggested_point(theta)
+    at = suggested_point(program, theta)
     seat = Seat.of(FittedModel(model, bench.base.footing, linear_program(program, at)))
     begun = replace(bench, seat=Seat(added, seat.point)).unfitted
     assert begun is not None
@@ -107,7 +108,7 @@ def test_a_refit_that_came_to_rest_on_the_way_begins_at_other_sizes(tmp_path: Pa
     model = with_drive(bench.current.model, item.augmentation.drive)
     theta = model.space.with_known(bench.current.values | item.starts[0].added(item.augmentation.off, 0.2))
     program = bench.current.footing.training(model)
-    at = solve_nodes(program, program.suggested_point(theta))
+    at = solve_nodes(program, suggested_point(program, theta))
     resting = FittedModel(model, bench.current.footing, linear_program(program, at))
     without = restored(held_out_costs(bench))
     known = Rival.of(item, resting, np.zeros(bench.current.blocks.count))

@@ -12,6 +12,7 @@ from diagnosis_cases import COULOMB, INERTIA, OFF, VISCOUS, axis, write_case
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.footing import FOLDS
 from friction_ocp.diagnosis.standstill import beside_jumps, settled
+from friction_ocp.estimation.first_nodes import carrying
 from friction_ocp.estimation.model import STEP_PER_RADIAN, Model, prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
@@ -56,7 +57,7 @@ def test_springs_that_slip_from_the_start_on_are_slackened(tmp_path: Path) -> No
     nodes = tuple(node.copy() for node in point.nodes)
     for node in nodes:
         node[0, at] = 1.01 * REACH * np.sign(node[1, 1])
-    bent = program.carrying(Point(point.theta, nodes), np.array([at]))
+    bent = carrying(program, Point(point.theta, nodes), np.array([at]))
     assert program.objective(solve_nodes(program, bent)) > program.objective(point) + 1000.0
     assert program.objective(settled(program, bent)) < program.objective(point) + 1.0
 

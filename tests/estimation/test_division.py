@@ -10,6 +10,7 @@ from axes import INERTIA, RATE, axis, problem, still_recording
 
 from friction_ocp.drive.parts import Gravity
 from friction_ocp.estimation.division import GROWTH, divided
+from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
 from friction_ocp.estimation.gap import gap_covariance
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.program import Point, Program
@@ -41,7 +42,7 @@ def start_of(model: Model) -> tuple[Program, Point]:
     """Return relaxed segments, all of which start in the balance."""
     program = relaxed(model, model.train, 0.0, Squares())
     return program, Point(
-        model.space.guess, tuple(np.zeros_like(part) for part in program.suggested_nodes(model.space.guess))
+        model.space.guess, tuple(np.zeros_like(part) for part in suggested_nodes(program, model.space.guess))
     )
 
 
@@ -66,7 +67,7 @@ def test_the_motion_goes_through_the_new_nodes() -> None:
     """Gaps appear nowhere: what the parts simulate is what the whole segments did."""
     model = model_with(np.pi)
     program, _ = start_of(model)
-    point = program.suggested_point(model.space.guess)
+    point = suggested_point(program, model.space.guess)
     cut, start = divided(model, program, point)
     before, after = program.simulate(0, point), cut.simulate(0, start)
     assert after.y == pytest.approx(before.y, abs=1e-9 * np.max(np.abs(before.y)))

@@ -13,6 +13,7 @@ from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, ste
 from smooth_programs import offset_rosenbrock, rosenbrock, toy
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.ipopt import solve_ipopt
 from friction_ocp.estimation.model import Model, prepare
@@ -65,7 +66,7 @@ def model() -> Model:
 
 def start(program: Program) -> Point:
     """Return the guesses with the nodes that the measurement suggests."""
-    return program.suggested_point(program.space.guess)
+    return suggested_point(program, program.space.guess)
 
 
 @pytest.mark.parametrize("kind", ["relaxed", "free run", "free run in windows", "measured starts"])

@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from friction_ocp.estimation.composite import Rows, best_step, linearised, solve_composite, tried
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, prepare_fit
@@ -35,7 +36,7 @@ def program(model: Model) -> Program:
 
 
 def start(program: Program) -> Point:
-    return program.suggested_point(program.space.guess)
+    return suggested_point(program, program.space.guess)
 
 
 @pytest.mark.parametrize("bound", [np.inf, 0.4])

@@ -11,6 +11,7 @@ from axes import INERTIA, axis, fitted_axis, problem, still_recording
 from hypothesis import given
 from hypothesis import strategies as st
 
+from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.stages import cuts, free_run, mean_error, predictions, relaxed, windows
@@ -77,7 +78,7 @@ def test_a_relaxed_program_of_one_segment_is_the_free_run(model: Model) -> None:
     """Where there are no gaps both have the same objective and gradient."""
     whole = prepare(problem(axis(inertia=Free(INERTIA)), still_recording("a"), segment=10_000))
     programs = (relaxed(whole, whole.train, 0.0, Squares()), free_run(whole, whole.train, 0.0, Squares(), None))
-    point = Point(1.3 * whole.space.guess, programs[0].suggested_nodes(whole.space.guess))
+    point = Point(1.3 * whole.space.guess, suggested_nodes(programs[0], whole.space.guess))
     one, other = (program.linearise(point) for program in programs)
     assert one.objective == pytest.approx(other.objective)
     assert one.theta_gradient == pytest.approx(other.theta_gradient)
@@ -93,7 +94,7 @@ def test_the_gradient_is_that_of_the_objective(kind: str) -> None:
         "predictions": lambda: predictions(model, model.train, 0.1),
     }
     program = builders[kind]()
-    point = program.suggested_point(model.space.guess)
+    point = suggested_point(program, model.space.guess)
     system = program.linearise(point)
     assert system.objective == pytest.approx(program.objective(point))
     for k, size in enumerate(1e-6 * model.space.guess):
@@ -111,6 +112,6 @@ def test_the_gradient_is_that_of_the_objective(kind: str) -> None:
 def test_the_mean_error_is_in_noise_floors(model: Model) -> None:
     """It is the mean absolute error of all samples that there are."""
     program = predictions(model, model.train, 0.0)
-    point = program.suggested_point(model.space.guess)
+    point = suggested_point(program, model.space.guess)
     errors = [program.residuals(k, program.simulate(k, point).y) for k in range(2)]
     assert mean_error(program, point) == pytest.approx(np.mean(np.abs(np.concatenate(errors))))

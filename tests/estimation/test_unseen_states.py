@@ -8,6 +8,7 @@ from joint_with_play import TRUTH, write_joint
 
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.drive.start import unseen_states
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
@@ -19,7 +20,7 @@ def of_truth(folder: Path) -> tuple[Model, Program, Point]:
     model = prepare(load_problem(write_joint(folder, with_play=True)))
     theta = model.space.with_known(TRUTH)
     program = footing(model, theta).training(model)
-    return model, program, program.suggested_point(theta)
+    return model, program, suggested_point(program, theta)
 
 
 def test_what_an_encoder_on_the_motor_does_not_show(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.problem import RecordingUse
@@ -72,7 +73,7 @@ def test_the_plant_confirms_the_expected_standard_errors(sharper: Design) -> Non
     problem = replace(fitted.model.problem, train=(RecordingUse(made),), validation=())
     model = prepare(problem)
     program = footing(model, fitted.theta).program(model, model.train)
-    linear = linear_program(program, solve_nodes(program, program.suggested_point(fitted.theta)))
+    linear = linear_program(program, solve_nodes(program, suggested_point(program, fitted.theta)))
     known = fitted.linear.rows.jacobian
     both = known.T @ known + linear.rows.jacobian.T @ linear.rows.jacobian
     assert option.std_errors is not None
