@@ -13,6 +13,7 @@ from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.carried import carried
 from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import Diagnosis, Round
+from friction_ocp.diagnosis.excerpts import excerpts
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
@@ -58,6 +59,7 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "gap": _gap(diagnosis),
         "biased_parameters": [_bias(item) for item in biased_parameters(diagnosis.base, diagnosis.final)],
         "next_experiment": None if following is None else _next_experiment(following),
+        "searched": _searched(diagnosis),
         "significance": diagnosis.level,
         "assumptions": _assumptions(diagnosis),
         "effort": diagnosis.effort,
@@ -66,6 +68,22 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "seconds": diagnosis.seconds,
         "channel_units": _units(diagnosis),
         "provenance": provenance(problem, "diagnose"),
+    }
+
+
+def _searched(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Return what the search went by of long training recordings, s on their clocks; None of shorter ones: all."""
+    model = diagnosis.base.model
+    found = excerpts(model)
+    if found is model.train:
+        return None
+    return {
+        "samples": sum(item.grid.time.size for item in found),
+        "of": sum(item.grid.time.size for item in model.train),
+        "pieces": [
+            {"recording": item.name, "from": float(item.grid.time[0]), "to": float(item.grid.time[-1])}
+            for item in found
+        ],
     }
 
 
@@ -326,6 +344,10 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.stated is not None:
         lines += corrections(diagnosis.stated, diagnosis.problem) + opened(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
+    part = _searched(diagnosis)
+    if part is not None:
+        size, more = f"{part['samples']} of {part['of']} samples", "`samples` under `diagnosis:` takes more"
+        lines.append(f"the search went by {size} of the training recordings, in {len(part['pieces'])} pieces: {more}")
     meant = considered(diagnosis.problem)
     left_out = [name for name in effects() if name not in meant.names]
     lines.append(f"the catalogue: {', '.join(meant.entries)}")

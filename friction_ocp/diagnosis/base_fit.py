@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.easing import along, eased, finer
+from friction_ocp.diagnosis.excerpts import excerpts
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
@@ -125,7 +126,7 @@ def _from_rest(fitted: FittedModel) -> FittedModel:
 
 def _rough_answer(model: Model) -> tuple[Program, Point]:
     """Fit on loosely joined segments, from the guesses and from short predictions."""
-    short = predictions(model, model.train, WIDTHS[0])
+    short = predictions(model, excerpts(model), WIDTHS[0])
     start = suggested_point(short, model.space.guess)
     starts = [model.space.guess, solve_gauss_newton(short, start, COARSE).point.theta]
     return loosely_joined(model, starts)

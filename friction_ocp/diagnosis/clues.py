@@ -59,7 +59,8 @@ def _clues_of(fitted: FittedModel) -> Clues:
     by_path = fitted.model.space.numbers_by_path(fitted.theta, fitted.model.train[0].name)
     typical = _typical_torques(fitted, tables, by_path)
     missing = _torques(fitted, watch, typical)
-    tracks = tuple(_track(fitted, *parts) for parts in zip(tables, *missing, strict=True))
+    names = [item.name for item in fitted.linear.program.experiments]
+    tracks = tuple(_track(fitted, *parts) for parts in zip(names, tables, *missing, strict=True))
     return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path))
 
 
@@ -143,10 +144,10 @@ def _table(fitted: FittedModel, index: int, watch: _Watch) -> dict[str, FloatArr
     return {"time": item.grid.time, **seen}
 
 
-def _track(fitted: FittedModel, table: Mapping[str, FloatArray], missing: Missing, finely: Missing) -> Track:
+def _track(fitted: FittedModel, name: str, table: Mapping[str, FloatArray], missing: Missing, finely: Missing) -> Track:
     drive = fitted.model.problem.drive
     torque = {motor.name: table[f"{motor.name}.torque"] for motor in drive.motors}
-    return Track(table["time"], _of(drive, table, "theta"), _of(drive, table, "omega"), torque, missing, finely)
+    return Track(table["time"], _of(drive, table, "theta"), _of(drive, table, "omega"), torque, missing, finely, name)
 
 
 def _of(drive: Drive, table: Mapping[str, FloatArray], kind: str) -> dict[str, FloatArray]:

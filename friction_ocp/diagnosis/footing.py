@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
+from friction_ocp.diagnosis.excerpts import cut_out, excerpts
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, slopes_about, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
-from friction_ocp.estimation.experiment import COLUMNS, Experiment
+from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import acceleration_noise, start_weight
 from friction_ocp.estimation.horizon import is_held
 from friction_ocp.estimation.model import Model, seen_by
@@ -129,19 +130,13 @@ def _shortest(item: Experiment) -> float:
 def pieces(item: Experiment, count: int) -> list[Experiment]:
     """Cut a recording into pieces that begin afresh; they keep its name."""
     edges = [round(edge) for edge in np.linspace(0, item.grid.time.size - 1, count + 1).tolist()]
-    found: list[Experiment] = []
-    for begin, end in pairwise(edges):
-        at = slice(begin, end + 1)
-        grid = replace(item.grid, **{part.name: getattr(item.grid, part.name)[at] for part in fields(item.grid)})
-        kept = {name: getattr(item, name)[at] for name in COLUMNS}
-        found.append(replace(item, grid=grid, **kept))
-    return found
+    return [cut_out(item, begin, end + 1) for begin, end in pairwise(edges)]
 
 
 def training_pieces(model: Model) -> tuple[Experiment, ...]:
-    """Return the training recordings, or pieces of the only one, without samples beside jumps."""
-    first, *others = model.train
-    whole = model.train if others else tuple(pieces(first, FOLDS))
+    """Return what the search goes by of the training recordings, without samples beside jumps: of one piece, pieces."""
+    first, *others = known = excerpts(model)
+    whole = known if others else tuple(pieces(first, FOLDS))
     outputs = model.drive.mechanism.drive.outputs
     return tuple(without_jumps(item, outputs, model.noise) for item in whole)
 

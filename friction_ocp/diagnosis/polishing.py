@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from friction_ocp.diagnosis.excerpts import excerpts
 from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import linear_program
@@ -75,7 +76,7 @@ def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program,
     Free runs over whole recordings have many ends, most of them far from the best; on loosely joined segments the way
     is short, and leads near it.
     """
-    program = relaxed(model, model.train, 0.0, Squares())
+    program = relaxed(model, excerpts(model), 0.0, Squares())
     ends = [solve_gauss_newton(program, suggested_point(program, theta), COARSE) for theta in starts]
     return program, min(ends, key=lambda end: end.objective).point
 

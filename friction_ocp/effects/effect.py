@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.units import DRIVE_TORQUE
-from friction_ocp.effects.spectrum import LINES, MOST_LINES, peaks, spectrum, without
+from friction_ocp.effects.periods import Seen, likeliest
+from friction_ocp.effects.spectrum import without
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.parameters import Free, bind
 
@@ -59,6 +60,7 @@ class Track:
     """Over the segments of the fit: what is slow, and little noise."""
     finely: Missing
     """Over a few samples each: what is fast, too, and more noise."""
+    recording: str = ""
 
     def ordinary(self, shaft: str) -> FloatArray:
         """Return (segments, 4) what constant torque, friction and inertia of a shaft do over the fine segments."""
@@ -110,43 +112,32 @@ class Clues:
         return list(self._known_periods[asked])
 
     def _periods(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[float]:
-        fine = [track.finely for track in self.tracks]
         whole = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
-        place = [
-            item.theta[shaft] if over == "theta" else track.time[item.middle]
-            for item, track in zip(fine, self.tracks, strict=True)
-        ]
         travel = max(float(np.ptp(one)) for one in whole)
-        frequencies = self._frequencies(place, travel)
         lowest = 2.0 / max(travel, 1e-300)
         if over == "theta":
             lowest = min(lowest, 1.0 / (2.0 * np.pi))
-        frequencies = frequencies[frequencies >= lowest]
-        power, beyond = np.zeros(frequencies.size), np.zeros(frequencies.size)
-        for track, item, one in zip(self.tracks, fine, place, strict=True):
-            if one.size < 8:
-                continue
-            factor = np.ones(one.size)
-            if against_motion:
-                factor = np.sign(item.omega[shaft])
-            if against_torque is not None:
-                factor = track.torque[against_torque][item.middle]
-            torque = item.torque[shaft]
-            power += spectrum(one - one[0], torque, factor, frequencies)
-            left = without(torque, track.ordinary(shaft))
-            beyond += spectrum(one - one[0], left, factor, frequencies)
-        if not np.any(power):
-            turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
-            return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
-        return [float(1.0 / frequencies[k]) for k in peaks(power, beyond)]
+        found = likeliest(
+            [self._seen(track, shaft, over, against_motion, against_torque) for track in self.tracks], lowest
+        )
+        if found:
+            return found
+        turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
+        return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
 
     @staticmethod
-    def _frequencies(place: Sequence[FloatArray], travel: float) -> FloatArray:
-        """Return frequencies half a cycle apart over the travel, up to half a cycle per segment at typical speed."""
-        steps = [np.sqrt(np.mean(np.diff(one) ** 2)) for one in place if one.size > 1]
-        fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
-        lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
-        return np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
+    def _seen(track: Track, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> Seen:
+        """Return what is missing along a recording: a wave over an angle has one phase in all of them."""
+        item, torque = track.finely, track.finely.torque[shaft]
+        factor = np.ones(torque.size)
+        if against_motion:
+            factor = np.sign(item.omega[shaft])
+        if against_torque is not None:
+            factor = track.torque[against_torque][item.middle]
+        left = without(torque, track.ordinary(shaft))
+        if over == "theta":
+            return Seen(item.theta[shaft], torque, left, factor)
+        return Seen(track.time[item.middle], torque, left, factor, track.recording)
 
     def ringing(self, shaft: str, slowest: float, fastest: float) -> list[float]:
         """Return angular frequencies, rad/s, at which the missing torque of a shaft is strongest, within limits.

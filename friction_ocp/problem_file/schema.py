@@ -283,6 +283,7 @@ class DiagnosisSection(Section):
     exclude: Any = None
     significance: Any = None
     effort: Any = None
+    samples: Any = None
 
 
 class LimitsSection(Section):

@@ -17,8 +17,8 @@ from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
 
 SAMPLES, INTERVAL, SEGMENT = 6000, 1e-3, 4
-SPEED, TEETH = 60.0, 24
-"""rad/s of the motor, and waves in a turn."""
+SPEED, TEETH, POLES = 60.0, 24, 8
+"""rad/s of the motor, and waves in a turn: on short ways and on long ones."""
 WAVE = 2.0
 """rad: a period of friction."""
 
@@ -65,6 +65,29 @@ def test_a_wave_of_friction_is_found_beside_what_parameters_could_do() -> None:
         periods = Clues((track,), {}, {"motor": 1.0}).periods("motor", "theta", against_motion=True)
         found[name] = min(abs(1.0 / period - 1.0 / WAVE) for period in periods)
     assert max(found.values()) < 1.0 / float(np.ptp(theta))
+
+
+@pytest.mark.parametrize("apart", [0.0, 40.0])
+def test_a_wave_is_found_over_a_long_way(apart: float) -> None:
+    """Thousands of waves, all along or in pieces far from each other: to a part of a cycle over the whole way.
+
+    A fit of all pieces, whose waves have one phase, begins there.
+    """
+    rng = np.random.default_rng(5)
+    tracks, began, steps = list[Track](), 0.0, 8 * SAMPLES if apart == 0.0 else SAMPLES // 2
+    for _ in range(1 if apart == 0.0 else 8):
+        time = began + INTERVAL * np.arange(steps)
+        omega = SPEED * (1.0 + 0.2 * np.sin(2.0 * np.pi * time / 1.7))
+        theta = SPEED * began + INTERVAL * np.cumsum(omega)
+        middle = np.arange(SEGMENT // 2, steps, SEGMENT)
+        torque = 0.05 * np.cos(POLES * theta[middle] + 0.4) + 0.05 * rng.standard_normal(middle.size)
+        missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
+        tracks.append(Track(time, {"motor": theta}, {"motor": omega}, {"drive": np.ones(steps)}, missing, missing))
+        began += INTERVAL * steps + apart
+    known = Clues(tuple(tracks), {}, {"motor": 1.0})
+    found, way = known.periods("motor", "theta"), float(np.ptp(known.angles("motor")))
+    assert way * POLES / (2.0 * np.pi) > 2000.0
+    assert min(abs(1.0 / period - POLES / (2.0 * np.pi)) for period in found[:2]) < 0.25 / way
 
 
 def test_a_wave_is_found_through_a_coarse_encoder(tmp_path: Path) -> None:

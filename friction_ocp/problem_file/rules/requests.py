@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from friction_ocp.diagnosis.excerpts import samples_of
 from friction_ocp.diagnosis.options import considered, effort_of, level_of
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem
@@ -13,7 +14,7 @@ from friction_ocp.problem_file.rules.case import Case, Rule
 
 def diagnosis_is_possible(case: Case) -> Iterator[Finding]:
     """`diagnosis` names effects that exist, at places where they make sense, and numbers that can be."""
-    for reader in (considered, level_of, effort_of):
+    for reader in (considered, level_of, effort_of, samples_of):
         yield from _refused(reader, case.problem)
 
 
