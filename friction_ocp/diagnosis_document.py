@@ -131,7 +131,7 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
     found = _shape(diagnosis, components) if diagnosis.gap else None
     return {
         "components": _possible(diagnosis, components) or ([] if diagnosis.rest is None else [diagnosis.rest]),
-        "depends_on": None if found is None else {"variable": found.variable, "share": found.share},
+        "depends_on": None if found is None else _depends_on(found),
         "shape": None if found is None else _curve(found, diagnosis.problem.drive),
         "joint": _joint(diagnosis, components) if diagnosis.gap else None,
         "map": [
@@ -146,6 +146,11 @@ def _where(diagnosis: Diagnosis) -> dict[str, Any]:
             for cell in cells
         ],
     }
+
+
+def _depends_on(found: Shape) -> dict[str, Any]:
+    comes_back = {} if found.period is None else {"period": found.period}
+    return {"variable": found.variable, **comes_back, "share": found.share}
 
 
 def _possible(diagnosis: Diagnosis, components: list[str]) -> list[str]:

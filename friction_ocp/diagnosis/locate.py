@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,8 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 
 BINS = 16
 FOLDS = 5
+LIKELIEST = 2
+"""Periods that are looked at."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Shape:
 
     component: str
     variable: str
+    period: float | None
+    """In which the variable comes back, where it is one of that length that counts, in the unit of the variable."""
     share: float
     """Of its variance that the variable explains, cross-validated over stretches of time."""
     centre: FloatArray
@@ -43,30 +46,47 @@ def shape(clues: Clues, shaft: str, after: Clues | None = None) -> Shape | None:
     if torque.size < 4 * BINS or not np.any(torque):
         return None
     variables = _variables(clues, shaft)
-    shares = {name: explained(values, torque) for name, values in variables.items()}
-    best = max(shares, key=lambda name: shares[name])
+    shares = [explained(one.values, torque) for one in variables]
+    best = int(np.argmax(shares))
     left = None if after is None else _missing_torque(after, shaft)
     taken = torque - left if left is not None and left.size == torque.size else None
-    return _shape(shaft, best, shares[best], variables[best], torque, taken)
+    return _shape(shaft, variables[best], shares[best], torque, taken)
 
 
 def _missing_torque(clues: Clues, shaft: str) -> FloatArray:
     return np.concatenate([track.missing.torque.get(shaft, np.zeros(0)) for track in clues.tracks])
 
 
-def _variables(clues: Clues, shaft: str) -> Mapping[str, FloatArray]:
+@dataclass(frozen=True)
+class _Variable:
+    name: str
+    values: FloatArray
+    """(segments,)."""
+    period: float | None = None
+
+    def within(self, period: float) -> _Variable:
+        """Return where the variable is within a period."""
+        return _Variable(self.name, np.mod(self.values, period), period)
+
+
+def _variables(clues: Clues, shaft: str) -> list[_Variable]:
+    """Return what may explain a torque, angle and time within their likeliest periods last."""
+
     def joined(series: list[FloatArray]) -> FloatArray:
         parts = [values[track.missing.middle] for values, track in zip(series, clues.tracks, strict=True)]
         return np.concatenate(parts)
 
-    found = {
-        f"{shaft}.omega": np.concatenate([track.missing.omega[shaft] for track in clues.tracks]),
-        f"{shaft}.theta": np.concatenate([track.missing.theta[shaft] for track in clues.tracks]),
-        "time": joined([track.time - track.time[0] for track in clues.tracks]),
-    }
-    for motor in clues.tracks[0].torque:
-        found[f"{motor}.torque"] = joined([track.torque[motor] for track in clues.tracks])
-    return found
+    speed = np.concatenate([track.missing.omega[shaft] for track in clues.tracks])
+    angle = _Variable(f"{shaft}.theta", np.concatenate([track.missing.theta[shaft] for track in clues.tracks]))
+    since = _Variable("time", joined([track.time - track.time[0] for track in clues.tracks]))
+    clock = _Variable("time", joined([track.time for track in clues.tracks]))
+    torques = [
+        _Variable(f"{motor}.torque", joined([track.torque[motor] for track in clues.tracks]))
+        for motor in clues.tracks[0].torque
+    ]
+    folded = [angle.within(period) for period in clues.periods(shaft, "theta")[:LIKELIEST]]
+    folded += [clock.within(period) for period in clues.periods(shaft, "time")[:LIKELIEST]]
+    return [_Variable(f"{shaft}.omega", speed), angle, since, *torques, *folded]
 
 
 def explained(values: FloatArray, torque: FloatArray) -> float:
@@ -89,16 +109,10 @@ def _bins(values: FloatArray) -> IntArray:
     return np.searchsorted(edges, values).astype(np.int64)
 
 
-def _shape(
-    shaft: str,
-    name: str,
-    share: float,
-    values: FloatArray,
-    torque: FloatArray,
-    taken: FloatArray | None,
-) -> Shape:
-    bins = _bins(values)
+def _shape(shaft: str, over: _Variable, share: float, torque: FloatArray, taken: FloatArray | None) -> Shape:
+    bins = _bins(over.values)
     told = np.bincount(bins, minlength=BINS) > 0
     mean, low, high = band(bins, torque, BINS)
     by = None if taken is None else means(bins, taken, BINS)[told]
-    return Shape(shaft, name, share, means(bins, values, BINS)[told], mean[told], low[told], high[told], by)
+    centre = means(bins, over.values, BINS)[told]
+    return Shape(shaft, over.name, over.period, share, centre, mean[told], low[told], high[told], by)

@@ -80,11 +80,13 @@ def shape_figure(found: Json, where: Json) -> Figure:
     if found.get("taken"):
         axes.plot(at, found["taken"], color=SIMULATED, linewidth=1.6, label="taken by what was added")
     axes.axhline(0.0, color=MUTED, linewidth=1.0)
-    share = float(part(where, "depends_on")["share"])
+    over, unit = part(where, "depends_on"), unit_text(str(found.get("variable_unit", "")))
+    name = str(found["variable"])
+    if over.get("period") is not None:
+        name += f" within {float(over['period']):.4g} {unit}".rstrip()
     axes.set_title(
-        f"What the model lacks at {found['component']}: {found['variable']} explains {100 * share:.0f} % of it"
+        f"What the model lacks at {found['component']}: {name} explains {100 * float(over['share']):.0f} % of it"
     )
-    unit = unit_text(str(found.get("variable_unit", "")))
     axes.set_xlabel(f"{found['variable']} in {unit}" if unit else str(found["variable"]))
     axes.set_ylabel(f"missing torque in {unit_text(str(found.get('unit', 'SI units')))}")
     axes.legend(loc="best")

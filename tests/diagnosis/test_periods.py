@@ -11,6 +11,7 @@ from diagnosis_cases import TORQUE_CONSTANT, axis, write_case
 from plant import PlantRipple
 
 from friction_ocp.diagnosis.bench import open_bench
+from friction_ocp.diagnosis.locate import shape
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
@@ -47,6 +48,16 @@ def test_a_wave_is_found_beside_a_larger_drift(drift: float) -> None:
     found = clues(0.1, drift).periods("motor", "theta")
     travel = 2.0 * SPEED / np.pi
     assert min(abs(1.0 / period - TEETH / (2.0 * np.pi)) for period in found[:2]) < 1.0 / travel
+
+
+def test_a_wave_is_shown_within_its_period() -> None:
+    """What explains a wave is the angle within its period, and the curve over that is the wave; a drift needs none."""
+    found = shape(clues(0.1, 0.0), "motor")
+    assert found is not None and found.variable == "motor.theta" and found.period is not None
+    assert found.period == pytest.approx(2.0 * np.pi / TEETH, rel=0.01) and found.share > 0.8
+    assert np.ptp(found.torque) == pytest.approx(0.2, rel=0.15)
+    drifting = shape(clues(0.0, 0.1), "motor")
+    assert drifting is not None and drifting.variable == "motor.omega" and drifting.period is None
 
 
 def test_a_wave_of_friction_is_found_beside_what_parameters_could_do() -> None:
