@@ -293,6 +293,8 @@ class LinearProgram:
         _kept.move_to_end(weakref.ref(self))
         return self.__dict__[_LAID]
 
+    # derivatives outgrow all numbers where a simulation breaks down
+    @np.errstate(over="ignore", invalid="ignore")
     def lay(self) -> None:
         """Linearise, and forget of others what was longest not asked for."""
         self.__dict__[_LAID] = items, rows = _laid(self.program, self.point)

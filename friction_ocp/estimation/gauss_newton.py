@@ -111,6 +111,8 @@ class _Iterate:
     """Damping of the step along a valley that led here, if one did."""
 
 
+# derivatives outgrow all numbers where a simulation breaks down; the objective there is infinite
+@np.errstate(over="ignore", invalid="ignore")
 def solve_gauss_newton(
     program: Program, start: Point, tolerances: Tolerances = USUAL, watch: Watch | None = None
 ) -> Solution:

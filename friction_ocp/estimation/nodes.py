@@ -13,6 +13,8 @@ NOTHING, RELATIVE = 1e-3, 1e-9
 """Decrease of the objective below which a step gained nothing: in units of log-likelihood, and of the objective."""
 
 
+# derivatives outgrow all numbers where a simulation breaks down; the objective there is infinite
+@np.errstate(over="ignore", invalid="ignore")
 def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible: float = NOTHING) -> Point:
     """Solve for the node states with the parameters held, until a step gains next to nothing of log-likelihood."""
     if program.without_nodes:

@@ -16,6 +16,8 @@ WORTH = 0.01
 """Decrease of the objective for which nodes are exchanged."""
 
 
+# derivatives outgrow all numbers where a simulation breaks down; the objective there is infinite
+@np.errstate(over="ignore", invalid="ignore")
 def spliced(program: Program, point: Point, other: Point) -> Point:
     """Return the point with the nodes of the other wherever a stretch of them costs less.
 
