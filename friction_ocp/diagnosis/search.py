@@ -81,7 +81,7 @@ class Search:
         self._most = self.patience * max(MOST_STEPS, MOST_RUNS * once)
         longest = took * self._most / max(once, 1.0)
         if longest > LONG:
-            shorter = "`effort` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
+            shorter = "`effort` or `samples` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
             self.tell(f"the search may take about {longest / 60.0:.0f} min on one processor; {shorter}", 0.0)
 
     @property
