@@ -107,9 +107,10 @@ def _merged(chosen: Sequence[Stretch]) -> list[Stretch]:
 
 def _visits(problem: Problem, sizes: Sequence[int], cut: Sequence[Stretch]) -> FloatArray:
     """Return (stretches, intervals) how many of its points lie in each interval."""
-    points = np.concatenate([_points(problem, problem.train[item.recording], item, sizes) for item in cut])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    place = np.nan_to_num((points - low) / np.maximum(high - low, 1e-300))
+    own = [[item for item in cut if item.recording == k] for k in range(len(sizes))]
+    points = np.concatenate([_points(problem, problem.train[k], size, own[k]) for k, size in enumerate(sizes)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    place = (points - low) / np.maximum(high - low, 1e-300)
     stretch = np.repeat(np.arange(len(cut)), POINTS - 1)
     parts = np.array([item.recording * PARTS + PARTS * item.begin // sizes[item.recording] for item in cut])[stretch]
     found = [_counted(stretch, parts, len(cut))]
@@ -126,20 +127,19 @@ def _counted(stretch: IntArray, interval: IntArray, count: int) -> FloatArray:
     return found
 
 
-def _points(problem: Problem, use: RecordingUse, item: Stretch, sizes: Sequence[int]) -> FloatArray:
-    """Return (points, variables) what channels show along a stretch, and how fast angles change."""
+def _points(problem: Problem, use: RecordingUse, size: int, cut: Sequence[Stretch]) -> FloatArray:
+    """Return (points, variables) what channels of a recording show along stretches, and how fast angles change."""
     drive, known = problem.drive, use.recording.channels
     clocks = [known[channel.name].time for channel in drive.outputs]
     begin, end = min(float(clock[0]) for clock in clocks), max(float(clock[-1]) for clock in clocks)
-    size = max(sizes[item.recording], 1)
-    time = begin + (end - begin) * np.linspace(item.begin, item.end, POINTS) / size
+    along = np.stack([np.linspace(item.begin, item.end, POINTS) for item in cut])
+    time = begin + (end - begin) * along / size
     columns = list[FloatArray]()
     for channel in (*drive.inputs, *drive.outputs):
         seen = np.isfinite(known[channel.name].values)
-        if not seen.any():
-            continue
-        values = np.interp(time, known[channel.name].time[seen], known[channel.name].values[seen])
-        columns.append(values[1:])
+        stamps, values = known[channel.name].time[seen], known[channel.name].values[seen]
+        passed = np.interp(time, stamps, values) if values.size else np.zeros(time.shape)
+        columns.append(passed[:, 1:].ravel())
         if channel.signal == "theta":
-            columns.append(np.diff(values))
+            columns.append(np.diff(passed, axis=1).ravel())
     return np.column_stack(columns)

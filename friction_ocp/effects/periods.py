@@ -39,10 +39,11 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[float]:
     typical speed. Where these are too many, stretches are cut until they are not: a long way has many cycles, and a few
     of them show a period nearly as well. What they show is sharpened along all stretches that share a phase.
     """
-    steps = [np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen if one.place.size > 1]
+    seen = [one for one in seen if one.place.size >= FEWEST]
+    steps = [np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen]
     fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
     most = MOST_LINES / 2.0 / max(fastest, 1e-300)
-    parts = [part for one in seen for part in _parts(one, most) if part.place.size >= FEWEST]
+    parts = [part for one in seen for part in _parts(one, most)]
     travel = max([float(np.ptp(part.place)) for part in parts], default=0.0)
     lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
     frequencies = np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
