@@ -41,7 +41,7 @@ MOST_SHAPES = 4
 
 def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) -> dict[str, Any]:
     """Return the content of result.json for a diagnosis and what to record after it."""
-    problem = diagnosis.problem
+    problem, part = diagnosis.problem, _searched(diagnosis)
     return {
         "format": FORMAT,
         "status": "diagnosed",
@@ -59,9 +59,9 @@ def diagnosis_document(diagnosis: Diagnosis, following: FollowUp | None = None) 
         "gap": _gap(diagnosis),
         "biased_parameters": [_bias(item) for item in biased_parameters(diagnosis.base, diagnosis.final)],
         "next_experiment": None if following is None else _next_experiment(following),
-        "searched": _searched(diagnosis),
+        "searched": part,
         "significance": diagnosis.level,
-        "assumptions": _assumptions(diagnosis),
+        "assumptions": _assumptions(diagnosis, part),
         "effort": diagnosis.effort,
         "cut_short": diagnosis.cut_short,
         "by_predictions": diagnosis.by_predictions,
@@ -335,7 +335,7 @@ def _bias(item: Bias) -> dict[str, Any]:
     }
 
 
-def _assumptions(diagnosis: Diagnosis) -> list[str]:
+def _assumptions(diagnosis: Diagnosis, part: dict[str, Any] | None) -> list[str]:
     foot = diagnosis.base.footing
     units = _units(diagnosis)
     lines = [
@@ -349,7 +349,6 @@ def _assumptions(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.stated is not None:
         lines += corrections(diagnosis.stated, diagnosis.problem) + opened(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
-    part = _searched(diagnosis)
     if part is not None:
         size, more = f"{part['samples']} of {part['of']} samples", "`samples` under `diagnosis:` takes more"
         lines.append(f"the search went by {size} of the training recordings, in {len(part['pieces'])} pieces: {more}")

@@ -61,6 +61,7 @@ class Track:
     finely: Missing
     """Over a few samples each: what is fast, too, and more noise."""
     recording: str = ""
+    """Its name; pieces of one have the same."""
 
     def ordinary(self, shaft: str) -> FloatArray:
         """Return (segments, 4) what constant torque, friction and inertia of a shaft do over the fine segments."""

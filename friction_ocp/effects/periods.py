@@ -51,8 +51,8 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[float]:
     power, beyond = _spectra(parts, frequencies)
     if not np.any(power):
         return []
-    apart = 0.5 / max(travel, 1e-300)
-    sharp = [_sharpened(seen, float(frequencies[k]), apart) for k in peaks(power, beyond)]
+    apart, whole = 0.5 / max(travel, 1e-300), _joined(seen)
+    sharp = [_sharpened(whole, float(frequencies[k]), apart) for k in peaks(power, beyond)]
     return [1.0 / frequency for frequency in dict.fromkeys(sharp)]
 
 
@@ -77,10 +77,8 @@ def _parts(one: Seen, most: float) -> Iterator[Seen]:
         yield from _parts(half, most)
 
 
-def _sharpened(seen: Sequence[Seen], frequency: float, apart: float) -> float:
-    """Return the frequency within a distance of one that is strongest with one phase along stretches that share it."""
-    groups = {one.together: [each for each in seen if each.together == one.together] for one in seen}
-    whole = [_joined(group) for group in groups.values()]
+def _sharpened(whole: Sequence[Seen], frequency: float, apart: float) -> float:
+    """Return the frequency within a distance of one that is strongest with one phase along each whole."""
     span = max(float(np.ptp(one.place)) for one in whole)
     count = int(np.ceil(2.0 * FINER * apart * span))
     if count <= 2.0 * FINER:
@@ -91,10 +89,16 @@ def _sharpened(seen: Sequence[Seen], frequency: float, apart: float) -> float:
     return float(near[int(np.argmax(power))])
 
 
-def _joined(group: Sequence[Seen]) -> Seen:
-    return Seen(
-        np.concatenate([one.place for one in group]),
-        np.concatenate([one.torque for one in group]),
-        np.concatenate([one.beyond for one in group]),
-        np.concatenate([one.factor for one in group]),
-    )
+def _joined(seen: Sequence[Seen]) -> list[Seen]:
+    """Return stretches that share a phase as one."""
+    groups = {one.together: [each for each in seen if each.together == one.together] for one in seen}
+    return [
+        Seen(
+            np.concatenate([one.place for one in group]),
+            np.concatenate([one.torque for one in group]),
+            np.concatenate([one.beyond for one in group]),
+            np.concatenate([one.factor for one in group]),
+            together,
+        )
+        for together, group in groups.items()
+    ]
