@@ -12,6 +12,14 @@ settings.register_profile("steady", deadline=None, derandomize=True)
 settings.load_profile("steady")
 
 
+@pytest.fixture(scope="module")
+def without_figures() -> Iterator[None]:
+    """Leave out figures/ for a module that makes many results and looks at other parts of them: it is most of a fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("friction_ocp.plots.figures.write_figures", lambda *_: [])
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _signals_as_they_were() -> Iterator[None]:
     """Undo the handlers that the command line installs; Ctrl-C works even where the shell had switched it off."""

@@ -25,6 +25,8 @@ sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
 from diagnosis_cases import axis, write_case
 from simulated_fleet import write_axis, write_fleet
 
+pytestmark = pytest.mark.usefixtures("without_figures")
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -90,8 +90,11 @@ def write_case(folder: Path, plant: Plant, seed: int = 1, effects: Sequence[str]
 
 
 def diagnosed(path: Path) -> dict[str, Any]:
-    """Return the result document of a diagnosis by command, its folder `out` beside the problem."""
-    assert main(["diagnose", str(path), "--out", str(path.parent / "out")]) == 0
+    """Return the result document of a diagnosis by command, its folder `out` beside the problem.
+
+    Tests run side by side already: workers would spend more time on starting than on what they save.
+    """
+    assert main(["diagnose", str(path), "--out", str(path.parent / "out"), "--workers", "1"]) == 0
     return json.loads((path.parent / "out" / "result.json").read_text(encoding="utf-8"))
 
 

@@ -95,7 +95,7 @@ def test_the_shape_is_drawn_with_what_was_added(stribeck: tuple[Path, dict[str, 
 def test_a_model_that_lacks_nothing_has_no_gap(tmp_path: Path) -> None:
     """Nothing is found where nothing is missing."""
     path = write_case(tmp_path, axis())
-    assert main(["diagnose", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert main(["diagnose", str(path), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
     result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert result["verdict"] == "no_gap"
     assert result["accepted"] == [] and result["biased_parameters"] == []

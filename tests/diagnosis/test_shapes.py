@@ -89,7 +89,7 @@ def cogging_once_a_turn() -> Plant:
 def diagnosed(folder: Path, plant: Plant, effects: list[str]) -> dict[str, Any]:
     """Return the result document of a diagnosis with a narrow catalogue."""
     path = write_case(folder, plant, effects=effects)
-    assert main(["diagnose", str(path), "--out", str(folder / "out")]) == 0
+    assert main(["diagnose", str(path), "--out", str(folder / "out"), "--workers", "1"]) == 0
     return json.loads((folder / "out" / "result.json").read_text(encoding="utf-8"))
 
 
