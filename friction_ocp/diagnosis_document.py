@@ -261,11 +261,11 @@ def _added(diagnosis: Diagnosis, key: Key) -> dict[str, Any]:
     for item in diagnosis.rounds:
         if item.accepted is not None and item.accepted.key == key:
             names |= _own(item.before, item.accepted)
-    names |= _of_all_shapes(diagnosis.base, key)
+    shapes = _of_all_shapes(diagnosis.base, key)
     drive = diagnosis.final.model.problem.drive
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
     final = diagnosis.final.values
-    names &= set(final)
+    names = {name for name in final if name in names or name.partition("@")[0] in shapes}
     return {name: {"value": final[name], "unit": units[name.partition("@")[0]]} for name in sorted(names)}
 
 
@@ -307,6 +307,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
             "interval95": [number(end) for end in closed.interval95],
             **{name: number(value) for name, value in closed.by_channel.items()},
         },
+        "own_values": {run.name: dict(run.own) for run in diagnosis.after.runs if run.own},
     }
 
 
@@ -352,6 +353,10 @@ def _assumptions(diagnosis: Diagnosis, part: dict[str, Any] | None) -> list[str]
     if part is not None:
         size, more = f"{part['samples']} of {part['of']} samples", "`samples` under `diagnosis:` takes more"
         lines.append(f"the search went by {size} of the training recordings, in {len(part['pieces'])} pieces: {more}")
+    own = sorted({name.partition("@")[0] for name in diagnosis.final.values if "@" in name})
+    if own:
+        how = "one that is held out has what suits it, as it has a start of its own"
+        lines.append(f"every recording has its own {', '.join(own)}: {how}")
     meant = considered(diagnosis.problem)
     left_out = [name for name in effects() if name not in meant.names]
     lines.append(f"the catalogue: {', '.join(meant.entries)}")

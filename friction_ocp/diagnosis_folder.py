@@ -9,6 +9,7 @@ from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.drive.units import signal_unit
+from friction_ocp.estimation.score import numbers_of_own
 from friction_ocp.excitation.next_experiment import follow_up
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
 from friction_ocp.recording.result_series import RecordingSeries
@@ -38,10 +39,12 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path, executor: AbstractE
     write_result_series(target / "result.h5", after)
     path = diagnosis.problem.path
     if path is not None:
-        for name, fitted in (("base.yaml", diagnosis.base), ("augmented.yaml", diagnosis.final)):
+        ends = ((diagnosis.base, diagnosis.before), (diagnosis.final, diagnosis.after))
+        for name, (fitted, errors) in zip(("base.yaml", "augmented.yaml"), ends, strict=True):
             model, source = fitted.model, diagnosis.problem.text
             settings = (model.max_step, source, model.problem.estimation.horizon_s)
-            text = write_problem(path, model.problem.drive, fitted.values, target, *settings)
+            values = {**fitted.values, **numbers_of_own(errors.runs)}
+            text = write_problem(path, model.problem.drive, values, target, *settings)
             write_text(target / name, text)
     if following is not None and following.option is not None:
         write_recording(following.option.run.recording, target / "next_experiment.h5")

@@ -9,6 +9,7 @@ from typing import Any
 
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, Simulation
+from friction_ocp.estimation.score import numbers_of_own
 from friction_ocp.recording.result_series import RecordingSeries
 from friction_ocp.result_document import estimate_document, simulation_document, simulation_series
 from friction_ocp.statistics.compare import Comparison
@@ -52,7 +53,8 @@ def fitted_problem(estimate: Estimate, folder: Path) -> str | None:
     if path is None:
         return None
     try:
-        return dump_problem(path, estimate.values, folder, run.max_step, estimate.problem.text, run.horizon_s)
+        values = {**estimate.values, **numbers_of_own(run.validation)}
+        return dump_problem(path, values, folder, run.max_step, estimate.problem.text, run.horizon_s)
     except FrictionOcpError:  # parameters that were added after the file was read
         return None
 

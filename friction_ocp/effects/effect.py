@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.units import DRIVE_TORQUE
-from friction_ocp.effects.periods import Seen, likeliest
+from friction_ocp.effects.periods import Likely, Seen, likeliest
 from friction_ocp.effects.spectrum import without
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.parameters import Free, bind
@@ -81,7 +81,7 @@ class Clues:
     """By shaft, N m: what moves it."""
     steady: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     """By shaft, rad/s: speeds at which static points were taken, where there are any."""
-    _known_periods: dict[tuple[str, str, bool, str | None], list[float]] = field(
+    _known_waves: dict[tuple[str, str, bool, str | None], list[Likely]] = field(
         default_factory=lambda: {}, init=False, repr=False, compare=False
     )
 
@@ -107,12 +107,30 @@ class Clues:
         add to the missing torque goes with speed and acceleration, and these with the angle: waves are looked for
         without that, too. Without a missing torque, harmonics of a turn, or parts of the longest recording.
         """
-        asked = (shaft, over, against_motion, against_torque)
-        if asked not in self._known_periods:
-            self._known_periods[asked] = self._periods(*asked)
-        return list(self._known_periods[asked])
+        return [wave.period for wave in self._waves(shaft, over, against_motion, against_torque)]
 
-    def _periods(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[float]:
+    def apart(
+        self, shaft: str, over: str, against_motion: bool = False, against_torque: str | None = None
+    ) -> tuple[str, ...]:
+        """Return the names of all recordings where the likeliest wave has another phase in each; none where it has not.
+
+        The arguments are those of `periods`.
+        """
+        likeliest_one = self._waves(shaft, over, against_motion, against_torque)[0]
+        return self.recordings if likeliest_one.apart else ()
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """The names of all recordings."""
+        return tuple(dict.fromkeys(track.recording for track in self.tracks))
+
+    def _waves(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[Likely]:
+        asked = (shaft, over, against_motion, against_torque)
+        if asked not in self._known_waves:
+            self._known_waves[asked] = self._looked_for(*asked)
+        return self._known_waves[asked]
+
+    def _looked_for(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[Likely]:
         whole = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
         travel = max(float(np.ptp(one)) for one in whole)
         lowest = 2.0 / max(travel, 1e-300)
@@ -124,11 +142,12 @@ class Clues:
         if found:
             return found
         turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
-        return [float(item) for item in (turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0]))]
+        usual = turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0])
+        return [Likely(float(period), apart=False) for period in usual]
 
     @staticmethod
     def _seen(track: Track, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> Seen:
-        """Return what is missing along a recording: a wave over an angle has one phase in all of them."""
+        """Return what is missing along a recording."""
         item, torque = track.finely, track.finely.torque[shaft]
         factor = np.ones(torque.size)
         if against_motion:
@@ -136,9 +155,8 @@ class Clues:
         if against_torque is not None:
             factor = track.torque[against_torque][item.middle]
         left = without(torque, track.ordinary(shaft))
-        if over == "theta":
-            return Seen(item.theta[shaft], torque, left, factor)
-        return Seen(track.time[item.middle], torque, left, factor, track.recording)
+        place = item.theta[shaft] if over == "theta" else track.time[item.middle]
+        return Seen(place, torque, left, factor, track.recording)
 
     def ringing(self, shaft: str, slowest: float, fastest: float) -> list[float]:
         """Return angular frequencies, rad/s, at which the missing torque of a shaft is strongest, within limits.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -29,16 +30,32 @@ from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, start_of
 
 
-def wave(stem: str, size: float, periods: list[float]) -> tuple[list[Free], dict[str, float], tuple[Trial, ...]]:
+def wave(
+    stem: str, size: float, periods: list[float], apart: Sequence[str] = ()
+) -> tuple[list[Free], dict[str, float], tuple[Trial, ...]]:
     """Return free cosine, sine and period of a wave, its off values and a trial for each period.
 
-    `stem` is what the paths of its numbers begin with.
+    `stem` is what the paths of its numbers begin with; `apart` are recordings that have a phase each, if they have.
     """
-    amplitude = either_way(size)
     period = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
-    paths = [f"{stem}{part}" for part in ("cosine", "sine")]
-    trials = tuple(Trial(tuple({name: size} for name in paths), {f"{stem}period": each}) for each in periods)
-    return [amplitude, amplitude, period], dict.fromkeys(paths, 0.0), trials
+    names = named([f"{stem}{part}" for part in ("cosine", "sine")], apart)
+    trials = tuple(Trial(tuple({name: size} for name in names), {f"{stem}period": each}) for each in periods)
+    return [amplitude(size, apart)] * 2 + [period], dict.fromkeys(names, 0.0), trials
+
+
+def amplitude(size: float, apart: Sequence[str]) -> Free:
+    """Return a cosine or sine part, of each recording where these are `apart`."""
+    return replace(either_way(size), scope="recording") if apart else either_way(size)
+
+
+def named(paths: Sequence[str], apart: Sequence[str]) -> list[str]:
+    """Return the names of fitted numbers: of each recording where these are `apart`."""
+    return [f"{path}@{name}" for path in paths for name in apart] if apart else list(paths)
+
+
+def has_own(part: Wave) -> bool:
+    """Whether a wave has a phase in each recording."""
+    return isinstance(part.cosine, Free) and part.cosine.scope == "recording"
 
 
 FURTHER = 0.1
@@ -49,20 +66,32 @@ SAME_PERIOD = 0.1
 """Relative difference up to which a period of what is missing is taken for that of the wave, or of an overtone."""
 
 
+def set_apart(
+    part: Any, path: str, clues: Clues, apart: Sequence[str]
+) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
+    """Return a wave that has a phase in each recording, the values of the one that it had, and a trial."""
+    now = {kind: clues.numbers.get(f"{path}.{kind}", start_of(getattr(part, kind))) for kind in ("cosine", "sine")}
+    size = math.hypot(*now.values()) or FURTHER
+    off = {f"{path}.{kind}@{name}": value for kind, value in now.items() for name in apart}
+    trial = Trial(tuple({name: value + size} for name, value in off.items()))
+    return replace(part, **dict.fromkeys(now, amplitude(size, apart))), off, (trial,)
+
+
 def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
-    size = _further_size(part, path, clues)
-    names = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
-    paths = [f"{path}.{name}" for name in names]
-    trial = Trial(tuple({name: size} for name in paths))
-    return replace(part, **dict.fromkeys(names, either_way(size))), dict.fromkeys(paths, 0.0), (trial,)
+    size, apart = _further_size(part, path, clues), clues.recordings if has_own(part) else ()
+    kinds = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
+    names = named([f"{path}.{kind}" for kind in kinds], apart)
+    trial = Trial(tuple({name: size} for name in names))
+    return replace(part, **dict.fromkeys(kinds, amplitude(size, apart))), dict.fromkeys(names, 0.0), (trial,)
 
 
 def other_wave(
     part: Any, path: str, clues: Clues, periods: list[float]
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with a free one of another period beside it, off values and a trial for each period."""
-    (cosine, sine, period), off, trials = wave(f"{path}.other_", _further_size(part, path, clues), periods)
+    apart = clues.recordings if has_own(part) else ()
+    (cosine, sine, period), off, trials = wave(f"{path}.other_", _further_size(part, path, clues), periods, apart)
     return replace(part, other_cosine=cosine, other_sine=sine, other_period=period), off, trials
 
 
@@ -72,7 +101,10 @@ def _further_size(part: Any, path: str, clues: Clues) -> float:
 
 
 class AbstractWaveEffect(AbstractEffect):
-    """A wave that a part of the drive lacks; once one was accepted, with overtones and a wave of another period."""
+    """A wave that a part of the drive lacks; once one was accepted, with overtones and a wave of another period.
+
+    It has a phase in each recording where these show that; also once one was accepted.
+    """
 
     kind: ClassVar[type[Wave]]
 
@@ -88,22 +120,33 @@ class AbstractWaveEffect(AbstractEffect):
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         """Return the size of a trial and the periods that are tried."""
 
+    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
+        """Return the recordings that have a phase each; none where they share one."""
+        return ()
+
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        path = self.there(drive, place)[1]
-        numbers, off, trials = wave(f"{path}.", *self.size_and_periods(drive, place, clues))
+        path, apart = self.there(drive, place)[1], self.apart(drive, place, clues)
+        numbers, off, trials = wave(f"{path}.", *self.size_and_periods(drive, place, clues), apart)
         return Augmentation(self.with_wave(drive, place, self.kind(*numbers)), off, trials)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         part, path = self.there(drive, place)
-        if part is None or (part.has_overtones and part.has_other):
+        if part is None:
+            return None
+        period, found = clues.numbers.get(f"{path}.period", start_of(part.period)), list[float]()
+        if not (has_own(part) or part.has_overtones or part.has_other):
+            found, apart = self.size_and_periods(drive, place, clues)[1], self.apart(drive, place, clues)
+            if apart and abs(found[0] / period - 1.0) < SAME_PERIOD:
+                part, off, trials = set_apart(part, path, clues, apart)
+                return Augmentation(self.with_wave(drive, place, part), off, trials)
+        if part.has_overtones and part.has_other:
             return None
         off, trials = dict[str, float](), tuple[Trial, ...]()
         if not part.has_overtones:
             part, off, trials = overtones(part, path, clues)
         if not part.has_other:
-            period = clues.numbers.get(f"{path}.period", start_of(part.period))
             known = [period / order for order in (1, 2, 3)]
-            found = self.size_and_periods(drive, place, clues)[1]
+            found = found or self.size_and_periods(drive, place, clues)[1]
             strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
             part, none, further = other_wave(part, path, clues, strange or [SUBHARMONIC * period])
             off, trials = off | none, trials + further
@@ -128,6 +171,9 @@ class PositionRippleEffect(AbstractWaveEffect):
 
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE, clues.periods(place, "theta", against_motion=True)
+
+    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
+        return clues.apart(place, "theta", against_motion=True)
 
 
 def _driven(drive: Drive) -> dict[str, Motor]:
@@ -166,6 +212,9 @@ class CoggingEffect(AbstractMotorWaveEffect):
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE * clues.typical_torque[place], clues.periods(place, "theta")
 
+    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
+        return clues.apart(place, "theta")
+
 
 class TorqueRippleEffect(AbstractMotorWaveEffect):
     """Torque periodic in the motor angle and proportional to current."""
@@ -176,6 +225,9 @@ class TorqueRippleEffect(AbstractMotorWaveEffect):
 
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE, clues.periods(place, "theta", against_torque=_motor_at(drive, place).name)
+
+    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
+        return clues.apart(place, "theta", against_torque=_motor_at(drive, place).name)
 
 
 class PeriodicDisturbanceEffect(AbstractWaveEffect):
@@ -196,6 +248,9 @@ class PeriodicDisturbanceEffect(AbstractWaveEffect):
 
     def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
         return SHARE * clues.typical_torque[place], clues.periods(place, "time")
+
+    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
+        return clues.apart(place, "time")
 
 
 LARGEST = 0.5

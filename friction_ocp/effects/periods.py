@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.effects.spectrum import LINES, MOST_LINES, peaks, spectrum
 from friction_ocp.simulation.grid import FloatArray
 
+stats: Any = _stats  # its own types are incomplete
+
 FEWEST = 8
 """Places that tell anything."""
+SHARED, CHANCE = 0.9, 1e-3
+"""Share of what waves with phases of their own take, from which one phase for all recordings takes as much, and the
+chance with which a difference is none."""
 FINER = 4.0
 """Frequencies that are looked at in each cycle over the whole range of places, once a peak is known."""
 
@@ -28,16 +35,28 @@ class Seen:
     """(n,) N m, without what parameters could make up for."""
     factor: FloatArray
     """(n,) that a wave is multiplied with."""
-    together: str = ""
-    """Waves have the same phase in stretches that name the same."""
+    recording: str = ""
+    """Its name; a wave has one phase in all stretches of one."""
 
 
-def likeliest(seen: Sequence[Seen], lowest: float) -> list[float]:
-    """Return the likeliest periods of a wave, longer ones than 1/`lowest` left out; none where nothing is missing.
+@dataclass(frozen=True)
+class Likely:
+    """A wave that may be missing."""
+
+    period: float
+    """rad or s."""
+    apart: bool
+    """Whether each recording has it with a phase of its own: the zero of an encoder may lie anywhere when that is
+    switched on, and what comes from outside does not wait for a recording to begin."""
+
+
+def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
+    """Return the likeliest waves, longer ones than 1/`lowest` left out; none where nothing is missing.
 
     Frequencies are looked at half a cycle apart over the longest stretch, up to half a cycle from place to place at
     typical speed. Where these are too many, stretches are cut until they are not: a long way has many cycles, and a few
-    of them show a period nearly as well. What they show is sharpened along all stretches that share a phase.
+    of them show a period nearly as well. What they show is sharpened along all recordings with one phase, and along
+    each, and told by an F test and by how much it takes whether they have one.
     """
     seen = [one for one in seen if one.place.size >= FEWEST]
     steps = [np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen]
@@ -51,9 +70,9 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[float]:
     power, beyond = _spectra(parts, frequencies)
     if not np.any(power):
         return []
-    apart, whole = 0.5 / max(travel, 1e-300), _joined(seen)
-    sharp = [_sharpened(whole, float(frequencies[k]), apart) for k in peaks(power, beyond)]
-    return [1.0 / frequency for frequency in dict.fromkeys(sharp)]
+    step, each = 0.5 / max(travel, 1e-300), _by_recording(seen)
+    sharp = [_sharpened(each, float(frequencies[k]), step) for k in peaks(power, beyond)]
+    return [Likely(1.0 / frequency, apart) for frequency, apart in dict.fromkeys(sharp)]
 
 
 def _spectra(seen: Sequence[Seen], frequencies: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -73,32 +92,53 @@ def _parts(one: Seen, most: float) -> Iterator[Seen]:
         return
     middle = one.place.size // 2
     for at in (slice(middle), slice(middle, None)):
-        half = Seen(one.place[at], one.torque[at], one.beyond[at], one.factor[at], one.together)
+        half = Seen(one.place[at], one.torque[at], one.beyond[at], one.factor[at], one.recording)
         yield from _parts(half, most)
 
 
-def _sharpened(whole: Sequence[Seen], frequency: float, apart: float) -> float:
-    """Return the frequency within a distance of one that is strongest with one phase along each whole."""
+def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[float, bool]:
+    """Return the strongest frequency within a step of one, and whether it is so with a phase for each recording.
+
+    `each` are whole recordings.
+    """
+    alike, shared = _strongest([_joined(each)], frequency, step)
+    if len(each) == 1:
+        return alike, False
+    differing, own = _strongest(each, frequency, step)
+    more = 2 * (len(each) - 1)
+    left = sum(one.place.size for one in each) - more - 3
+    noise = (sum(float(np.sum(one.beyond**2)) for one in each) - own) / max(left, 1)
+    chance = float(stats.f.sf((own - shared) / more / max(noise, 1e-300), more, max(left, 1)))
+    apart = chance < CHANCE and shared < SHARED * (own - more * noise)
+    return (differing, True) if apart else (alike, False)
+
+
+def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[float, float]:
+    """Return the frequency within a step of one that takes most with one phase along each whole, and what it takes."""
     span = max(float(np.ptp(one.place)) for one in whole)
-    count = int(np.ceil(2.0 * FINER * apart * span))
-    if count <= 2.0 * FINER:
-        return frequency
-    near = frequency + apart * np.linspace(-1.0, 1.0, 2 * (min(count, MOST_LINES) // 2) + 1)
-    near = near[near > 0.0]
-    power = sum(spectrum(one.place - one.place[0], one.beyond, one.factor, near) for one in whole)
-    return float(near[int(np.argmax(power))])
+    count = int(np.ceil(2.0 * FINER * step * span))
+    near = np.array([frequency])
+    if count > 2.0 * FINER:
+        near = frequency + step * np.linspace(-1.0, 1.0, 2 * (min(count, MOST_LINES) // 2) + 1)
+        near = near[near > 0.0]
+    power = np.zeros(near.size)
+    for one in whole:
+        power += spectrum(one.place - one.place[0], one.beyond, one.factor, near)
+    best = int(np.argmax(power))
+    return float(near[best]), float(power[best])
 
 
-def _joined(seen: Sequence[Seen]) -> list[Seen]:
-    """Return stretches that share a phase as one."""
-    groups = {one.together: [each for each in seen if each.together == one.together] for one in seen}
-    return [
-        Seen(
-            np.concatenate([one.place for one in group]),
-            np.concatenate([one.torque for one in group]),
-            np.concatenate([one.beyond for one in group]),
-            np.concatenate([one.factor for one in group]),
-            together,
-        )
-        for together, group in groups.items()
-    ]
+def _by_recording(seen: Sequence[Seen]) -> list[Seen]:
+    names = dict.fromkeys(one.recording for one in seen)
+    return [_joined([one for one in seen if one.recording == name]) for name in names]
+
+
+def _joined(group: Sequence[Seen]) -> Seen:
+    """Return stretches as one."""
+    return Seen(
+        np.concatenate([one.place for one in group]),
+        np.concatenate([one.torque for one in group]),
+        np.concatenate([one.beyond for one in group]),
+        np.concatenate([one.factor for one in group]),
+        group[0].recording,
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.own_numbers import own_numbers, with_numbers
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import free_run, relaxed
 from friction_ocp.simulation.grid import FloatArray
@@ -33,6 +34,13 @@ class FreeRun:
     """(n, states)."""
     late: Mapping[str, float]
     """By channel: how much later than `time` the stamps of its samples are, s."""
+    own: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By path: numbers that were fitted to this recording alone, which took no part in the fit."""
+
+
+def numbers_of_own(runs: Sequence[FreeRun]) -> dict[str, float]:
+    """Return the numbers that were fitted to single recordings, each as `path@recording`."""
+    return {f"{path}@{run.name}": value for run in runs for path, value in run.own.items()}
 
 
 @dataclass(frozen=True)
@@ -54,11 +62,13 @@ def simulate_recordings(
     """Simulate recordings freely with exact friction, over windows where the drive drifts.
 
     Windows of a fitted free run start where they come closest, as far as that is found: from what was measured, or from
-    the smoothed state, whichever leads to less.
+    the smoothed state, whichever leads to less. A number that each recording has for itself is fitted to one that took
+    no part in the fit.
     """
     if not experiments:
         return ()
-    span = horizon(model)
+    own, span = own_numbers(model, experiments, theta), horizon(model)
+    model = with_numbers(model, own)
     program = free_run(model, experiments, width, Squares(), span)
     point = suggested_point(program, theta)
     if not fits_free_run(model):
@@ -72,7 +82,8 @@ def simulate_recordings(
     for index, item in enumerate(experiments):
         result = program.simulate(index, point, with_states=True)
         assert result.states is not None
-        runs.append(FreeRun(item.name, item.grid.time, item.measured, result.y, result.states, item.late))
+        seen = (item.name, item.grid.time, item.measured, result.y, result.states, item.late)
+        runs.append(FreeRun(*seen, own.get(item.name, {})))
     return tuple(runs)
 
 

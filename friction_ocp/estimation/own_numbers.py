@@ -1,0 +1,81 @@
+"""What each recording has of its own, of recordings that took no part in a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.values import bind_drive, drive_leaves
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.first_nodes import suggested_point
+from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.parameter_space import parameter_space
+from friction_ocp.estimation.problem import RecordingUse
+from friction_ocp.estimation.stages import relaxed
+from friction_ocp.parameters import Free
+from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.losses import Squares
+
+ENOUGH = Tolerances(max_iterations=30)
+MOST_STARTS = 3
+"""From which they are fitted."""
+
+
+def own_numbers(model: Model, experiments: Sequence[Experiment], theta: FloatArray) -> dict[str, Mapping[str, float]]:
+    """Return the numbers of `scope: recording`, by path, of recordings by name that took no part in the fit.
+
+    As the state in which a recording begins, such a number says nothing about another recording: it is fitted to short
+    segments of its own, all that is shared being what the fit has found. It begins at the best values of fitted
+    recordings and is bounded as theirs are.
+    """
+    values = {leaf.path: leaf.value for leaf in drive_leaves(model.problem.drive)}
+    if not any(isinstance(value, Free) and value.scope == "recording" for value in values.values()):
+        return {}
+    fitted = {use.name for use in model.problem.fitted}
+    uses = {use.name: use for use in model.problem.validation if use.name not in fitted}
+    known = dict(zip(model.space.names, map(float, theta), strict=True))
+    shared = bind_drive(model.problem.drive, {path: known.get(path, value) for path, value in values.items()})
+    asked = [item for item in experiments if item.name in uses]
+    found = {item.name: _fitted(model, shared, uses[item.name], item, known) for item in asked}
+    return {name: numbers for name, numbers in found.items() if numbers}
+
+
+def with_numbers(model: Model, own: Mapping[str, Mapping[str, float]]) -> Model:
+    """Return a model with numbers, by path, of recordings by name set beside those that the problem sets."""
+    if not own:
+        return model
+    uses = tuple(replace(use, set={**use.set, **own.get(use.name, {})}) for use in model.problem.validation)
+    problem = replace(model.problem, validation=uses)
+    space = parameter_space(problem, model.space.leaf_names, model.space.active)
+    return replace(model, problem=problem, space=space.moved(model.space.guess))
+
+
+def _fitted(
+    model: Model, shared: Drive, use: RecordingUse, item: Experiment, known: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the numbers that a recording has for itself, beside those that a drive shares."""
+    alone = replace(
+        model.problem, drive=shared, train=(use,), validation=(), static=(), static_validation=(), constraints=()
+    )
+    space = parameter_space(alone, model.space.leaf_names, model.space.active)
+    if not space.names:
+        return {}
+    seen = replace(model, problem=alone, space=space, train=(item,), validation=(), found={})
+    program, paths = relaxed(seen, (item,), 0.0, Squares()), [name.partition("@")[0] for name in space.names]
+    others = [
+        np.array([known.get(f"{path}@{other.name}", space.guess[k]) for k, path in enumerate(paths)])
+        for other in model.problem.fitted
+    ]
+    starts = [solve_nodes(program, suggested_point(program, start)) for start in _different(others)]
+    nearest = sorted(starts, key=program.objective)[:MOST_STARTS]
+    best = min((solve_gauss_newton(program, start, ENOUGH) for start in nearest), key=lambda end: end.objective)
+    return dict(zip(paths, map(float, best.point.theta), strict=True))
+
+
+def _different(starts: Sequence[FloatArray]) -> list[FloatArray]:
+    return list({start.tobytes(): start for start in starts}.values())

@@ -1,0 +1,137 @@
+"""Waves whose phase differs from recording to recording: nobody waits for them, and encoders begin anywhere."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from diagnosis_cases import COULOMB, VISCOUS, axis, diagnosed, plain_drive, record, write_case
+from plant import Plant, PlantRipple
+
+from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.estimation.estimate import identify, simulate
+from friction_ocp.problem_file.load import load_problem
+from friction_ocp.recording.hdf5 import write_recording
+from friction_ocp.result_folder import save
+
+PERIOD, SIZE = 0.3, 0.04
+"""s, N m: of a torque from outside."""
+TEETH, COGS = 6, 0.05
+"""Waves of cogging in a turn, and its size, N m."""
+SAMPLES, INTERVAL = 4000, 1e-3
+
+
+def tracks(phases: tuple[float, ...]) -> tuple[Track, ...]:
+    """Return motors to and fro that lack a wave over their angle, of a phase each, beside noise."""
+    rng, made = np.random.default_rng(11), list[Track]()
+    time, middle = INTERVAL * np.arange(SAMPLES), np.arange(2, SAMPLES, 4)
+    for k, phase in enumerate(phases):
+        omega = 20.0 * np.sin(2.0 * np.pi * time / (1.0 + 0.1 * k))
+        theta = INTERVAL * np.cumsum(omega)
+        torque = 0.1 * np.cos(TEETH * theta[middle] + phase) + 0.05 * rng.standard_normal(middle.size)
+        missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
+        moved = {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}
+        made.append(Track(time, *moved, missing, missing, f"run-{k}"))
+    return tuple(made)
+
+
+@pytest.mark.parametrize(
+    ("phases", "apart"), [((0.4, 0.4, 0.4), ()), ((0.4, 2.0, 4.0), ("run-0", "run-1", "run-2")), ((0.4,), ())]
+)
+def test_recordings_tell_whether_they_share_a_phase(phases: tuple[float, ...], apart: tuple[str, ...]) -> None:
+    """And the period is found either way."""
+    known = Clues(tracks(phases), {}, {"motor": 1.0})
+    assert known.apart("motor", "theta") == apart
+    travel = float(np.ptp(known.angles("motor")))
+    assert 1.0 / known.periods("motor", "theta")[0] == pytest.approx(TEETH / (2.0 * np.pi), abs=0.5 / travel)
+
+
+def written(folder: Path, plants: tuple[Plant, ...], effects: tuple[str, ...]) -> Path:
+    """Write a problem whose recordings a, b (training) and c (validation) are of a plant each."""
+    path = write_case(folder, plants[0], effects=effects)
+    for k, (name, plant) in enumerate(zip("abc", plants, strict=True)):
+        write_recording(record(plant, name, 10 + k), folder / f"{name}.h5")
+    return path
+
+
+def pushed(phase: float) -> Plant:
+    """Return an axis that something outside pushes and pulls."""
+    plain, torque = axis(), SIZE * np.exp(1j * phase)
+    shaft = replace(plain.shafts[0], disturbance=PlantRipple(PERIOD, float(torque.real), float(torque.imag)))
+    return replace(plain, shafts=(shaft,))
+
+
+def test_a_disturbance_does_not_wait_for_recordings(tmp_path: Path) -> None:
+    """Found with a phase for each; that of the recording held out is its own, and is kept beside it."""
+    path = written(tmp_path, tuple(map(pushed, (0.3, 2.1, 4.0))), ("periodic_disturbance", "cogging", "stribeck"))
+    result = diagnosed(path)
+    (accepted,) = result["accepted"]
+    assert (accepted["effect"], accepted["component"], result["verdict"]) == (
+        "periodic_disturbance",
+        "motor",
+        "explained",
+    )
+    values = {name: item["value"] for name, item in accepted["parameters"].items()}
+    assert values["motor.disturbance.period"] == pytest.approx(PERIOD, rel=1e-3)
+    values |= {f"{path}@c": value for path, value in result["gap"]["own_values"]["c"].items()}
+    for name, phase in zip("abc", (0.3, 2.1, 4.0), strict=True):
+        cosine, sine = (values[f"motor.disturbance.{part}@{name}"] for part in ("cosine", "sine"))
+        assert complex(cosine, sine) == pytest.approx(SIZE * np.exp(1j * phase), abs=0.1 * SIZE)
+    assert result["gap"]["shrink"]["overall"] > 0.99
+    own = "every recording has its own motor.disturbance.cosine"
+    assert any(line.startswith(own) for line in result["assumptions"])
+    again = simulate(load_problem(tmp_path / "out" / "augmented.yaml"))
+    errors, _ = again.validation_errors["position"]
+    assert errors.rms == pytest.approx(result["gap"]["after"]["position"]["rms"], rel=0.05)
+
+
+@pytest.mark.slow
+def test_cogging_is_found_behind_an_encoder_that_begins_at_zero(tmp_path: Path) -> None:
+    """The rotor stands anywhere when an incremental encoder is switched on."""
+
+    def cogged(phase: float) -> Plant:
+        plain, torque = axis(), COGS * np.exp(1j * phase)
+        waves = PlantRipple(2.0 * np.pi / TEETH, float(torque.real), float(torque.imag))
+        return replace(plain, motors=(replace(plain.motors[0], cogging=waves),))
+
+    result = diagnosed(
+        written(tmp_path, tuple(map(cogged, (0.3, 2.1, 4.0))), ("cogging", "position_ripple", "stribeck"))
+    )
+    (accepted,) = result["accepted"]
+    assert (accepted["effect"], result["verdict"]) == ("cogging", "explained")
+    values = {name: item["value"] for name, item in accepted["parameters"].items()}
+    for name in "ab":
+        size = np.hypot(*(values[f"motor.cogging.{part}@{name}"] for part in ("cosine", "sine")))
+        assert size == pytest.approx(COGS, rel=0.1)
+
+
+def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path) -> None:
+    """A constant torque of each recording: on the one held out it is estimated as its start is, and said."""
+    torques = (0.02, -0.03, 0.05)
+    plain = axis()
+    plants = tuple(replace(plain, shafts=(replace(plain.shafts[0], external_torque=one),)) for one in torques)
+    path = written(tmp_path, plants, ())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"] = plain_drive(VISCOUS)
+    constant = {"guess": 0.0, "min": -COULOMB, "max": COULOMB, "scope": "recording"}
+    document["drive"]["shafts"][0]["external_torque"] = {"constant": constant}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    found = identify(load_problem(path))
+    (held,) = found.simulation.validation
+    name = "motor.external_torque.constant"
+    values = {**found.values, f"{name}@c": held.own[name]}
+    for recording, torque in zip("abc", torques, strict=True):
+        assert values[f"{name}@{recording}"] == pytest.approx(torque, abs=2e-3)
+    train, validation = (
+        one["position"][0].noise_ratio for one in (found.simulation.train_errors, found.simulation.validation_errors)
+    )
+    assert validation < 2.0 * max(train, 1.0)
+    save(found, tmp_path / "out")
+    written_down = yaml.safe_load((tmp_path / "out" / "fitted.yaml").read_text(encoding="utf-8"))["recordings"]
+    assert written_down["validation"][0]["set"] == {name: pytest.approx(held.own[name])}
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert result["fit"]["own_values"] == {"c": {name: pytest.approx(held.own[name])}}
