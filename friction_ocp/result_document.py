@@ -145,7 +145,7 @@ def _fit(simulation: Simulation) -> dict[str, Any]:
         "train": table(simulation.train_errors),
         "validation": table(simulation.validation_errors),
         "static": {item.name: _static(item) for item in simulation.static},
-        "own_values": {run.name: dict(run.own) for run in simulation.validation if run.own},
+        "own_values": {run.name: dict(run.own) for run in (*simulation.train, *simulation.validation) if run.own},
     }
 
 

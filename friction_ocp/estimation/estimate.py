@@ -194,15 +194,18 @@ def _missed_warning(fit: StaticFit) -> str:
 
 
 def simulate(problem: Problem) -> Simulation:
-    """Simulate all recordings freely with the guesses of a problem."""
+    """Simulate all recordings freely with the guesses of a problem.
+
+    A number of `scope: recording` that is not set for one is fitted to it, as the state is in which it begins.
+    """
     model = prepare(problem)
-    return simulate_model(model, model.space.guess)
+    return simulate_model(model, model.space.guess, fitted=False)
 
 
-def simulate_model(model: Model, theta: FloatArray) -> Simulation:
-    """Simulate all recordings freely with given parameters."""
-    train = simulate_recordings(model, model.train, theta)
-    validation = simulate_recordings(model, model.validation, theta)
+def simulate_model(model: Model, theta: FloatArray, fitted: bool = True) -> Simulation:
+    """Simulate all recordings freely with given parameters, to which those of training were `fitted`."""
+    train = simulate_recordings(model, model.train, theta, fitted=fitted)
+    validation = simulate_recordings(model, model.validation, theta, fitted=fitted)
     return Simulation(
         problem=model.problem,
         train=train,

@@ -26,9 +26,12 @@ MOST_STARTS = 3
 """From which they are fitted."""
 
 
-def own_numbers(model: Model, experiments: Sequence[Experiment], theta: FloatArray) -> dict[str, Mapping[str, float]]:
+def own_numbers(
+    model: Model, experiments: Sequence[Experiment], theta: FloatArray, fitted: bool = True
+) -> dict[str, Mapping[str, float]]:
     """Return the numbers of `scope: recording`, by path, of recordings by name that took no part in the fit.
 
+    Where nothing was `fitted` these are all recordings for which the problem does not set them.
     As the state in which a recording begins, such a number says nothing about another recording: it is fitted to short
     segments of its own, all that is shared being what the fit has found. It begins at the best values of fitted
     recordings and is bounded as theirs are.
@@ -36,8 +39,8 @@ def own_numbers(model: Model, experiments: Sequence[Experiment], theta: FloatArr
     values = {leaf.path: leaf.value for leaf in drive_leaves(model.problem.drive)}
     if not any(isinstance(value, Free) and value.scope == "recording" for value in values.values()):
         return {}
-    fitted = {use.name for use in model.problem.fitted}
-    uses = {use.name: use for use in model.problem.validation if use.name not in fitted}
+    those = {use.name for use in model.problem.fitted} if fitted else set[str]()
+    uses = {use.name: use for use in model.problem.recordings if use.name not in those}
     known = dict(zip(model.space.names, map(float, theta), strict=True))
     shared = bind_drive(model.problem.drive, {path: known.get(path, value) for path, value in values.items()})
     asked = [item for item in experiments if item.name in uses]
@@ -49,10 +52,14 @@ def with_numbers(model: Model, own: Mapping[str, Mapping[str, float]]) -> Model:
     """Return a model with numbers, by path, of recordings by name set beside those that the problem sets."""
     if not own:
         return model
-    uses = tuple(replace(use, set={**use.set, **own.get(use.name, {})}) for use in model.problem.validation)
-    problem = replace(model.problem, validation=uses)
+    train, validation = (
+        tuple(replace(use, set={**use.set, **own.get(use.name, {})}) for use in uses)
+        for uses in (model.problem.train, model.problem.validation)
+    )
+    problem = replace(model.problem, train=train, validation=validation)
     space = parameter_space(problem, model.space.leaf_names, model.space.active)
-    return replace(model, problem=problem, space=space.moved(model.space.guess))
+    known = dict(zip(model.space.names, map(float, model.space.guess), strict=True))
+    return replace(model, problem=problem, space=space.moved(space.with_known(known)))
 
 
 def _fitted(

@@ -57,18 +57,20 @@ class Errors:
 
 
 def simulate_recordings(
-    model: Model, experiments: tuple[Experiment, ...], theta: FloatArray, width: float = 0.0
+    model: Model, experiments: tuple[Experiment, ...], theta: FloatArray, width: float = 0.0, fitted: bool = True
 ) -> tuple[FreeRun, ...]:
     """Simulate recordings freely with exact friction, over windows where the drive drifts.
 
     Windows of a fitted free run start where they come closest, as far as that is found: from what was measured, or from
     the smoothed state, whichever leads to less. A number that each recording has for itself is fitted to one that took
-    no part in the fit.
+    no part in the fit, and to every one where nothing was `fitted`.
     """
     if not experiments:
         return ()
-    own, span = own_numbers(model, experiments, theta), horizon(model)
+    own, span = own_numbers(model, experiments, theta, fitted), horizon(model)
+    known = dict(zip(model.space.names, map(float, theta), strict=True))
     model = with_numbers(model, own)
+    theta = model.space.with_known(known)
     program = free_run(model, experiments, width, Squares(), span)
     point = suggested_point(program, theta)
     if not fits_free_run(model):

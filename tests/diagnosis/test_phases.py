@@ -87,6 +87,12 @@ def test_a_disturbance_does_not_wait_for_recordings(tmp_path: Path) -> None:
     again = simulate(load_problem(tmp_path / "out" / "augmented.yaml"))
     errors, _ = again.validation_errors["position"]
     assert errors.rms == pytest.approx(result["gap"]["after"]["position"]["rms"], rel=0.05)
+    fresh = yaml.safe_load((tmp_path / "out" / "augmented.yaml").read_text(encoding="utf-8"))
+    fresh["recordings"] = {"train": [str(tmp_path / "c.h5")]}
+    (tmp_path / "fresh.yaml").write_text(yaml.safe_dump(fresh), encoding="utf-8")
+    afresh = simulate(load_problem(tmp_path / "fresh.yaml"))
+    assert afresh.train_errors["position"][0].rms == pytest.approx(errors.rms, rel=0.05)
+    assert afresh.train[0].own == pytest.approx(result["gap"]["own_values"]["c"], abs=1e-4)
 
 
 @pytest.mark.slow
