@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from plant import Plant, PlantSensor, Trajectory
+from plant import Plant, PlantRipple, PlantSensor, Trajectory
 
 from blind.machines import LOOP_ENCODER, SUPPLY, Machine
 from blind.motions import reference
@@ -37,6 +37,25 @@ def silent(plant: Plant) -> Plant:
     return replace(plant, sensors=tuple(sensors))
 
 
+def begun_anywhere(plant: Plant, rng: np.random.Generator) -> Plant:
+    """Return a plant whose periodic torques from outside have gone on for a part of their period already."""
+    shafts = [
+        shaft if shaft.disturbance is None else replace(shaft, disturbance=gone_on(shaft.disturbance, rng.uniform()))
+        for shaft in plant.shafts
+    ]
+    return replace(plant, shafts=tuple(shafts))
+
+
+def gone_on(ripple: PlantRipple, share: float) -> PlantRipple:
+    """Return a wave that begins where another one is after a share of its period."""
+    turned = [
+        complex(cosine, sine) * np.exp(-2j * np.pi * order * share)
+        for order, (cosine, sine, _) in enumerate(ripple.rows(), start=1)
+    ]
+    cosine, sine = (tuple(float(getattr(one, part)) for one in turned) for part in ("real", "imag"))
+    return PlantRipple(ripple.period, cosine, sine)
+
+
 def run(
     machine: Machine,
     hidden: Hidden,
@@ -46,12 +65,14 @@ def run(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Return the recorded channels, all on the grid of the samples, and the truth.
 
-    Reference, what acts from outside and noise have generators of their own: none depends on the others.
+    Reference, what acts from outside and noise have generators of their own: none depends on the others. What acts from
+    outside periodically is somewhere in its period when a recording begins.
     """
-    streams = [np.random.default_rng([*seed, k]) for k in range(3)]
+    streams = [np.random.default_rng([*seed, k]) for k in range(4)]
     wanted = reference(machine, kind, streams[0])
     inputs = dict(wanted) | dict(hidden.extra(streams[1], machine.duration))
-    done = hidden.plant.simulate(machine.duration, inputs, streams[2], step=machine.step, truth_rate=truth_rate)
+    plant = begun_anywhere(hidden.plant, streams[3])
+    done = plant.simulate(machine.duration, inputs, streams[2], step=machine.step, truth_rate=truth_rate)
     time = machine.sample_time * np.arange(machine.samples)
     channels = {"time": time}
     for name, item in machine.document["channels"].items():

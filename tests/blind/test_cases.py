@@ -15,10 +15,11 @@ from blind.folder import write_problem
 from blind.machines import MACHINES, Machine, plant_of
 from blind.motions import KINDS
 from blind.outside import OUTSIDE
-from blind.recording import Hidden, run, silent
+from blind.recording import Hidden, gone_on, run, silent
 from blind.scales import measure
 from blind.site import Site
 from blind.visibility import Excited, View, size_for
+from plant import PlantRipple
 
 import friction_ocp as fo
 from friction_ocp.estimation.first_nodes import suggested_nodes
@@ -202,3 +203,15 @@ def test_all_cases_of_a_block_can_be_drawn() -> None:
         hidden = case.hidden()
         channels, _ = run(case.make_machine(), replace(hidden, plant=silent(hidden.plant)), "moves", (SEED, index))
         assert all(np.all(np.isfinite(values)) for values in channels.values())
+
+
+def test_a_periodic_torque_begins_anywhere() -> None:
+    """The same wave, later: as if the recording had begun after a share of its period."""
+    wave, share = PlantRipple(0.5, (1.0, 0.3), (-0.4, 0.2)), 0.3
+    later = gone_on(wave, share)
+    time = np.linspace(0.0, 1.0, 50)
+
+    def at(ripple: PlantRipple, when: np.ndarray) -> np.ndarray:
+        return sum(cosine * np.cos(rate * when) + sine * np.sin(rate * when) for cosine, sine, rate in ripple.rows())
+
+    assert at(later, time) == pytest.approx(at(wave, time + share * wave.period))
