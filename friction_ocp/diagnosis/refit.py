@@ -106,14 +106,17 @@ def _point(base: FittedModel, model: Model, built: Contrast, values: Mapping[str
 def _outright(
     base: FittedModel, model: Model, begins: Sequence[Mapping[str, float]], known: float
 ) -> list[FittedModel]:
-    """Fit from large effects; under a large misfit the best of them, where it comes closer than is `known`, to its end.
+    """Fit from large effects; the best of them to its end: under a large misfit where it comes closer than is `known`,
+    else where it gains half as much.
 
-    A few steps do not lead far where one rattles between flanks.
+    A few steps do not lead far where one rattles between flanks, or springs take over from a bristle.
     """
     tried = begins if base.astray else begins[:1]
     ends = [_led_loosely(base, model, {**base.values, **values}) for values in tried]
     best = min(ends, key=lambda end: end.objective, default=None)
-    return [*ends, completed(best)] if base.astray and best is not None and best.objective < known else ends
+    half = base.objective - max(MOST_OF * (base.objective - known), UNIMPORTANT)
+    enough = best is not None and best.objective < (known if base.astray else half)
+    return [*ends, completed(best)] if best is not None and enough else ends
 
 
 def _led_loosely(base: FittedModel, model: Model, values: Mapping[str, float]) -> FittedModel:
