@@ -64,13 +64,16 @@ class _Variable:
     """(segments,)."""
     period: float | None = None
 
-    def within(self, period: float) -> _Variable:
-        """Return where the variable is within a period."""
-        return _Variable(self.name, np.mod(self.values, period), period)
+    def within(self, period: float, crests: FloatArray) -> _Variable:
+        """Return where the variable is within a period that begins at places (segments,)."""
+        return _Variable(self.name, np.mod(self.values - crests, period), period)
 
 
 def _variables(clues: Clues, shaft: str) -> list[_Variable]:
-    """Return what may explain a torque, angle and time within their likeliest periods last."""
+    """Return what may explain a torque, angle and time within their likeliest periods last.
+
+    Where the phase of a wave differs from recording to recording, periods begin at its crests.
+    """
 
     def joined(series: list[FloatArray]) -> FloatArray:
         parts = [values[track.missing.middle] for values, track in zip(series, clues.tracks, strict=True)]
@@ -84,9 +87,16 @@ def _variables(clues: Clues, shaft: str) -> list[_Variable]:
         _Variable(f"{motor}.torque", joined([track.torque[motor] for track in clues.tracks]))
         for motor in clues.tracks[0].torque
     ]
-    folded = [angle.within(period) for period in clues.periods(shaft, "theta")[:LIKELIEST]]
-    folded += [clock.within(period) for period in clues.periods(shaft, "time")[:LIKELIEST]]
-    return [_Variable(f"{shaft}.omega", speed), angle, since, *torques, *folded]
+
+    def folded(over: _Variable, kind: str) -> list[_Variable]:
+        waves = clues.waves(shaft, kind)[:LIKELIEST]
+        crests = [
+            [np.full(track.missing.middle.size, wave.crests.get(track.recording, 0.0)) for track in clues.tracks]
+            for wave in waves
+        ]
+        return [over.within(wave.period, np.concatenate(own)) for wave, own in zip(waves, crests, strict=True)]
+
+    return [_Variable(f"{shaft}.omega", speed), angle, since, *torques, *folded(angle, "theta"), *folded(clock, "time")]
 
 
 def explained(values: FloatArray, torque: FloatArray) -> float:

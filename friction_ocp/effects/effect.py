@@ -107,7 +107,7 @@ class Clues:
         add to the missing torque goes with speed and acceleration, and these with the angle: waves are looked for
         without that, too. Without a missing torque, harmonics of a turn, or parts of the longest recording.
         """
-        return [wave.period for wave in self._waves(shaft, over, against_motion, against_torque)]
+        return [wave.period for wave in self.waves(shaft, over, against_motion, against_torque)]
 
     def apart(
         self, shaft: str, over: str, against_motion: bool = False, against_torque: str | None = None
@@ -116,15 +116,17 @@ class Clues:
 
         The arguments are those of `periods`.
         """
-        likeliest_one = self._waves(shaft, over, against_motion, against_torque)[0]
-        return self.recordings if likeliest_one.apart else ()
+        return self.recordings if self.waves(shaft, over, against_motion, against_torque)[0].apart else ()
 
     @property
     def recordings(self) -> tuple[str, ...]:
         """The names of all recordings."""
         return tuple(dict.fromkeys(track.recording for track in self.tracks))
 
-    def _waves(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[Likely]:
+    def waves(
+        self, shaft: str, over: str, against_motion: bool = False, against_torque: str | None = None
+    ) -> list[Likely]:
+        """Return the likeliest waves; the arguments are those of `periods`."""
         asked = (shaft, over, against_motion, against_torque)
         if asked not in self._known_waves:
             self._known_waves[asked] = self._looked_for(*asked)
@@ -143,7 +145,7 @@ class Clues:
             return found
         turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
         usual = turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0])
-        return [Likely(float(period), apart=False) for period in usual]
+        return [Likely(float(period)) for period in usual]
 
     @staticmethod
     def _seen(track: Track, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> Seen:

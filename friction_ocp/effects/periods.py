@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,9 +46,11 @@ class Likely:
 
     period: float
     """rad or s."""
-    apart: bool
+    apart: bool = False
     """Whether each recording has it with a phase of its own: the zero of an encoder may lie anywhere when that is
     switched on, and what comes from outside does not wait for a recording to begin."""
+    crests: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By recording, where these are apart: a place at which the wave is highest, rad or s."""
 
 
 def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
@@ -73,7 +75,10 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
         return []
     step, each = 0.5 / max(travel, 1e-300), _by_recording(seen)
     sharp = [_sharpened(each, float(frequencies[k]), step) for k in peaks(power, beyond)]
-    return [Likely(1.0 / frequency, apart) for frequency, apart in dict.fromkeys(sharp)]
+    return [
+        Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each} if apart else {})
+        for frequency, apart in dict.fromkeys(sharp)
+    ]
 
 
 def _spectra(seen: Sequence[Seen], frequencies: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -127,6 +132,14 @@ def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[fl
         power += spectrum(one.place - one.place[0], one.beyond, one.factor, near)
     best = int(np.argmax(power))
     return float(near[best]), float(power[best])
+
+
+def _crest(one: Seen, frequency: float) -> float:
+    """Return a place at which the wave of a frequency is highest along a recording."""
+    turns = 2.0 * np.pi * frequency * one.place
+    basis = one.factor[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
+    cosine, sine = np.linalg.lstsq(basis, one.beyond, rcond=None)[0]
+    return float(np.arctan2(sine, cosine) / (2.0 * np.pi * frequency))
 
 
 def _by_recording(seen: Sequence[Seen]) -> list[Seen]:

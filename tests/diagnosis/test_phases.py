@@ -12,6 +12,7 @@ import yaml
 from diagnosis_cases import COULOMB, VISCOUS, axis, diagnosed, plain_drive, record, write_case
 from plant import Plant, PlantRipple
 
+from friction_ocp.diagnosis.locate import shape
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.problem_file.load import load_problem
@@ -48,6 +49,8 @@ def test_recordings_tell_whether_they_share_a_phase(phases: tuple[float, ...], a
     assert known.apart("motor", "theta") == apart
     travel = float(np.ptp(known.angles("motor")))
     assert 1.0 / known.periods("motor", "theta")[0] == pytest.approx(TEETH / (2.0 * np.pi), abs=0.5 / travel)
+    found = shape(known, "motor")
+    assert found is not None and found.variable == "motor.theta" and found.period is not None and found.share > 0.4
 
 
 def written(folder: Path, plants: tuple[Plant, ...], effects: tuple[str, ...]) -> Path:
