@@ -114,9 +114,10 @@ class Clues:
     ) -> tuple[str, ...]:
         """Return the names of all recordings where the likeliest wave has another phase in each; none where it has not.
 
-        The arguments are those of `periods`.
+        Nor where there are static points: no phase is known at those. The arguments are those of `periods`.
         """
-        return self.recordings if self.waves(shaft, over, against_motion, against_torque)[0].apart else ()
+        likeliest_one = self.waves(shaft, over, against_motion, against_torque)[0]
+        return self.recordings if likeliest_one.apart and not self.steady else ()
 
     @property
     def recordings(self) -> tuple[str, ...]:
