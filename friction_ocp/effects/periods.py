@@ -16,7 +16,7 @@ stats: Any = _stats  # its own types are incomplete
 
 FEWEST = 8
 """Places that tell anything."""
-SHARED, CHANCE = 0.5, 1e-3
+SHARED, CHANCE = 0.75, 1e-3
 """Share of what waves with phases of their own take, up to which one phase for all recordings does not do, and the
 chance with which a difference is none. Under a large misfit periods are a little off, and phases then seem to differ:
 where one phase takes most it is tried, and set apart once that is accepted."""
