@@ -39,8 +39,11 @@ def save_diagnosis(diagnosis: Diagnosis, folder: str | Path, executor: AbstractE
     write_result_series(target / "result.h5", after)
     path = diagnosis.problem.path
     if path is not None:
-        ends = ((diagnosis.base, diagnosis.before), (diagnosis.final, diagnosis.after))
-        for name, (fitted, errors) in zip(("base.yaml", "augmented.yaml"), ends, strict=True):
+        ends = (
+            ("base.yaml", diagnosis.base, diagnosis.before),
+            ("augmented.yaml", diagnosis.final, diagnosis.after),
+        )
+        for name, fitted, errors in ends:
             model, source = fitted.model, diagnosis.problem.text
             settings = (model.max_step, source, model.problem.estimation.horizon_s)
             values = {**fitted.values, **numbers_of_own(errors.runs)}

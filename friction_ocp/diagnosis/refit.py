@@ -113,10 +113,11 @@ def _outright(
     """
     tried = begins if base.astray else begins[:1]
     ends = [_led_loosely(base, model, {**base.values, **values}) for values in tried]
-    best = min(ends, key=lambda end: end.objective, default=None)
+    if not ends:
+        return ends
+    best = min(ends, key=lambda end: end.objective)
     half = base.objective - max(MOST_OF * (base.objective - known), UNIMPORTANT)
-    enough = best is not None and best.objective < (known if base.astray else half)
-    return [*ends, completed(best)] if best is not None and enough else ends
+    return [*ends, completed(best)] if best.objective < (known if base.astray else half) else ends
 
 
 def _led_loosely(base: FittedModel, model: Model, values: Mapping[str, float]) -> FittedModel:

@@ -109,15 +109,12 @@ class Clues:
         """
         return [wave.period for wave in self.waves(shaft, over, against_motion, against_torque)]
 
-    def apart(
-        self, shaft: str, over: str, against_motion: bool = False, against_torque: str | None = None
-    ) -> tuple[str, ...]:
+    def apart(self, waves: Sequence[Likely]) -> tuple[str, ...]:
         """Return the names of all recordings where the likeliest wave has another phase in each; none where it has not.
 
-        Nor where there are static points: no phase is known at those. The arguments are those of `periods`.
+        Nor where there are static points: no phase is known at those.
         """
-        likeliest_one = self.waves(shaft, over, against_motion, against_torque)[0]
-        return self.recordings if likeliest_one.apart and not self.steady else ()
+        return self.recordings if waves[0].apart and not self.steady else ()
 
     @property
     def recordings(self) -> tuple[str, ...]:

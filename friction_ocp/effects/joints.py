@@ -25,6 +25,7 @@ from friction_ocp.effects.effect import (
 )
 from friction_ocp.effects.friction_curve import is_dry
 from friction_ocp.effects.periodic import AbstractWaveEffect
+from friction_ocp.effects.periods import Likely
 from friction_ocp.friction.static import CoulombViscous, NoFriction
 from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, is_off
@@ -255,9 +256,10 @@ class KinematicErrorEffect(AbstractWaveEffect):
     def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
         return change_transmission(drive, place, kinematic_error=part)
 
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
         item = transmission(drive, place)
         _, twist = _twist(item, clues)
         found = [*clues.periods(item.from_shaft, "theta")[:2], *clues.periods(item.to_shaft, "theta")[:2]]
         ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
-        return 0.1 * twist, [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
+        periods = [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
+        return 0.1 * twist, [Likely(period) for period in periods]

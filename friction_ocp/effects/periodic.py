@@ -8,8 +8,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from friction_ocp.drive.parts import Cogging, Disturbance, Drive, Eccentricity, Motor, TorqueRipple
 from friction_ocp.effects.effect import (
     AbstractEffect,
@@ -25,6 +23,7 @@ from friction_ocp.effects.effect import (
     moving_shafts,
 )
 from friction_ocp.effects.friction_curve import SHARE, is_dry
+from friction_ocp.effects.periods import Likely
 from friction_ocp.friction.modifiers import Ripple
 from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, start_of
@@ -70,7 +69,7 @@ def set_apart(
     part: Any, path: str, clues: Clues, apart: Sequence[str]
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave that has a phase in each recording, the values of the one that it had, and a trial."""
-    now = {kind: clues.numbers.get(f"{path}.{kind}", start_of(getattr(part, kind))) for kind in ("cosine", "sine")}
+    now = _found(part, path, clues)
     size = math.hypot(*now.values()) or FURTHER
     off = {f"{path}.{kind}@{name}": value for kind, value in now.items() for name in apart}
     trial = Trial(tuple({name: value + size} for name, value in off.items()))
@@ -96,8 +95,12 @@ def other_wave(
 
 
 def _further_size(part: Any, path: str, clues: Clues) -> float:
-    cosine, sine = (clues.numbers.get(f"{path}.{name}", start_of(getattr(part, name))) for name in ("cosine", "sine"))
-    return FURTHER * float(np.hypot(cosine, sine)) or FURTHER
+    return FURTHER * math.hypot(*_found(part, path, clues).values()) or FURTHER
+
+
+def _found(part: Any, path: str, clues: Clues) -> dict[str, float]:
+    """Return the fitted cosine and sine parts of a wave, by name."""
+    return {kind: clues.numbers.get(f"{path}.{kind}", start_of(getattr(part, kind))) for kind in ("cosine", "sine")}
 
 
 class AbstractWaveEffect(AbstractEffect):
@@ -117,36 +120,30 @@ class AbstractWaveEffect(AbstractEffect):
         """Return the drive with a wave at a place."""
 
     @abstractmethod
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
-        """Return the size of a trial and the periods that are tried."""
-
-    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
-        """Return the recordings that have a phase each; none where they share one."""
-        return ()
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
+        """Return the size of a trial and the waves that are tried."""
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        path, apart = self.there(drive, place)[1], self.apart(drive, place, clues)
-        numbers, off, trials = wave(f"{path}.", *self.size_and_periods(drive, place, clues), apart)
+        path, (size, found) = self.there(drive, place)[1], self.size_and_waves(drive, place, clues)
+        numbers, off, trials = wave(f"{path}.", size, [one.period for one in found], clues.apart(found))
         return Augmentation(self.with_wave(drive, place, self.kind(*numbers)), off, trials)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         part, path = self.there(drive, place)
-        if part is None:
+        if part is None or (part.has_overtones and part.has_other):
             return None
-        period, found = clues.numbers.get(f"{path}.period", start_of(part.period)), list[float]()
-        if not (has_own(part) or part.has_overtones or part.has_other):
-            found, apart = self.size_and_periods(drive, place, clues)[1], self.apart(drive, place, clues)
-            if apart and abs(found[0] / period - 1.0) < SAME_PERIOD:
-                part, off, trials = set_apart(part, path, clues, apart)
-                return Augmentation(self.with_wave(drive, place, part), off, trials)
-        if part.has_overtones and part.has_other:
-            return None
+        period = clues.numbers.get(f"{path}.period", start_of(part.period))
+        _, waves = self.size_and_waves(drive, place, clues)
+        found, apart = [one.period for one in waves], clues.apart(waves)
+        plain = not (has_own(part) or part.has_overtones or part.has_other)
+        if plain and apart and abs(found[0] / period - 1.0) < SAME_PERIOD:
+            part, off, trials = set_apart(part, path, clues, apart)
+            return Augmentation(self.with_wave(drive, place, part), off, trials)
         off, trials = dict[str, float](), tuple[Trial, ...]()
         if not part.has_overtones:
             part, off, trials = overtones(part, path, clues)
         if not part.has_other:
             known = [period / order for order in (1, 2, 3)]
-            found = found or self.size_and_periods(drive, place, clues)[1]
             strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
             part, none, further = other_wave(part, path, clues, strange or [SUBHARMONIC * period])
             off, trials = off | none, trials + further
@@ -169,11 +166,8 @@ class PositionRippleEffect(AbstractWaveEffect):
     def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
         return change_shaft(drive, place, friction=replace(drive.shaft(place).friction, ripple=part))
 
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
-        return SHARE, clues.periods(place, "theta", against_motion=True)
-
-    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
-        return clues.apart(place, "theta", against_motion=True)
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
+        return SHARE, clues.waves(place, "theta", against_motion=True)
 
 
 def _driven(drive: Drive) -> dict[str, Motor]:
@@ -209,11 +203,8 @@ class CoggingEffect(AbstractMotorWaveEffect):
     sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
     kind: ClassVar[type[Wave]] = Cogging
 
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
-        return SHARE * clues.typical_torque[place], clues.periods(place, "theta")
-
-    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
-        return clues.apart(place, "theta")
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
+        return SHARE * clues.typical_torque[place], clues.waves(place, "theta")
 
 
 class TorqueRippleEffect(AbstractMotorWaveEffect):
@@ -223,11 +214,8 @@ class TorqueRippleEffect(AbstractMotorWaveEffect):
     sentence: ClassVar[str] = "the motor's torque ripples with its angle, in proportion to the current"
     kind: ClassVar[type[Wave]] = TorqueRipple
 
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
-        return SHARE, clues.periods(place, "theta", against_torque=_motor_at(drive, place).name)
-
-    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
-        return clues.apart(place, "theta", against_torque=_motor_at(drive, place).name)
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
+        return SHARE, clues.waves(place, "theta", against_torque=_motor_at(drive, place).name)
 
 
 class PeriodicDisturbanceEffect(AbstractWaveEffect):
@@ -246,11 +234,8 @@ class PeriodicDisturbanceEffect(AbstractWaveEffect):
     def with_wave(self, drive: Drive, place: str, part: Any) -> Drive:
         return change_shaft(drive, place, disturbance=part)
 
-    def size_and_periods(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[float]]:
-        return SHARE * clues.typical_torque[place], clues.periods(place, "time")
-
-    def apart(self, drive: Drive, place: str, clues: Clues) -> tuple[str, ...]:
-        return clues.apart(place, "time")
+    def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
+        return SHARE * clues.typical_torque[place], clues.waves(place, "time")
 
 
 LARGEST = 0.5

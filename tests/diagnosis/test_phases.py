@@ -46,7 +46,7 @@ def tracks(phases: tuple[float, ...]) -> tuple[Track, ...]:
 def test_recordings_tell_whether_they_share_a_phase(phases: tuple[float, ...], apart: tuple[str, ...]) -> None:
     """And the period is found either way."""
     known = Clues(tracks(phases), {}, {"motor": 1.0})
-    assert known.apart("motor", "theta") == apart
+    assert known.apart(known.waves("motor", "theta")) == apart
     travel = float(np.ptp(known.angles("motor")))
     assert 1.0 / known.periods("motor", "theta")[0] == pytest.approx(TEETH / (2.0 * np.pi), abs=0.5 / travel)
     found = shape(known, "motor")
