@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.predicted import LEAST_SHARE, led_by_predictions
-from friction_ocp.diagnosis.reading import explains_more
+from friction_ocp.diagnosis.reading import explains_more, leaves_less
 from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
@@ -175,8 +175,9 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a model lacks; raises FrictionOcpError where the recordings do not fit the drive.
 
-    Where the inputs, read the other way between their samples, leave nothing with fewer additions, or where something
-    was left, that is how they are read. What a controller makes of noise is read from its recorded command.
+    Where the inputs, read the other way between their samples, do more by that alone than any addition, leave nothing
+    with fewer additions, or less where something is left, that is how they are read. What a controller makes of noise
+    is read from its recorded command.
     """
     driven = driven_as_recorded(problem)
     found = _as_read(problem if driven is None else driven, tell, execution)
@@ -185,8 +186,11 @@ def diagnose(
 
 def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     """Find what a model lacks, its inputs read as the problem says or the other way."""
-    readings = OtherReadings(problem)
-    stated = _diagnosed(problem, tell, execution, readings)
+    readings, began = OtherReadings(problem), time.perf_counter()
+    search = _searched(problem, tell, execution, readings)
+    if search.outdone is not None:
+        return _read_as(search.outdone, problem, tell, execution, search.effort, began)
+    stated = _concluded(problem, search, began)
     if not stated.gap:
         return stated
     tell("the inputs read the other way", 0.0)
@@ -196,28 +200,40 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     if not able:
         return stated
     other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)
-    read = _diagnosed(other, tell, execution, share=max(1.0 - stated.effort, LEAST_SHARE))
-    simpler = not read.left_over and (left or len(read.accepted) < len(accepted))
-    return replace(read, stated=problem, seconds=stated.seconds + read.seconds) if simpler else stated
+    read = _read_as(other, problem, tell, execution, stated.effort, began)
+    fewer = len(read.accepted) < len(accepted)
+    better = left and leaves_less(read.final, final, fewer) if read.left_over else left or fewer
+    return read if better else stated
 
 
-def _diagnosed(
+def _read_as(read: Problem, stated: Problem, tell: Tell, execution: Execution, taken: float, began: float) -> Diagnosis:
+    """Find what a model lacks whose inputs are `read` otherwise than stated, where some effort was `taken` before."""
+    search = _searched(read, tell, execution, share=max(1.0 - taken, LEAST_SHARE))
+    return replace(_concluded(read, search, began), stated=stated)
+
+
+def _searched(
     problem: Problem, tell: Tell, execution: Execution, readings: OtherReadings | None = None, share: float = 1.0
-) -> Diagnosis:
-    """Find what a model lacks, the inputs read as the problem says, by a share of the effort; others are fitted beside.
+) -> Search:
+    """Search for what a model lacks, the inputs read as the problem says, by a share of the effort; others beside.
 
     The base fit, score tests and refits of a round are tasks: in whatever process, with the same numbers, and taken
     from the output folder where an earlier run ended them.
     """
-    began = time.perf_counter()
     level, meant, patience = level_of(problem), considered(problem), share * effort_of(problem)
     tell("base model", 0.0)
     with execution.executor.kept(screen_candidate) as executor:
         run = replace(execution, executor=executor)
         search = Search(open_bench(problem, run), run, meant, level, tell, patience, readings)
         search.go()
-        if search.lost_its_way:
+        if search.lost_its_way and search.outdone is None:
             search = led_by_predictions(search, run)
+        return search
+
+
+def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
+    """Return what a search, `began` at that time, comes to."""
+    level, meant = search.level, search.meant
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
     current, checked = _checked(search.bench.current, base, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)

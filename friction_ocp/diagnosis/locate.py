@@ -91,7 +91,7 @@ def _variables(clues: Clues, shaft: str) -> list[_Variable]:
     def folded(over: _Variable, kind: str) -> list[_Variable]:
         waves = clues.waves(shaft, kind)[:LIKELIEST]
         crests = [
-            [np.full(track.missing.middle.size, wave.crests.get(track.recording, 0.0)) for track in clues.tracks]
+            [np.full(track.missing.middle.size, wave.beginning(track.recording)) for track in clues.tracks]
             for wave in waves
         ]
         return [over.within(wave.period, np.concatenate(own)) for wave, own in zip(waves, crests, strict=True)]

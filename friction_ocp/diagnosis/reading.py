@@ -94,10 +94,24 @@ def explains_more(
         return True
     if not left_over:
         return False
-    if but_last < left.ratio or _ratio_with(base, accepted, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
+    if but_last < left.ratio or _ratio_as(base, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
         return True
     turns = range(len(accepted) - 1)
     return any(_ratio_with(base, accepted[:k], final) < _ratio_with(stated, accepted[: k + 1], final) for k in turns)
+
+
+def leaves_less(read: FittedModel, stated: FittedModel, fewer: bool) -> bool:
+    """Whether a model whose inputs are `read` otherwise leaves notably less than the `stated` one does.
+
+    As much, but for the doubt about floors, is enough with `fewer` additions.
+
+    By the noise that the stated footing assumes, so that neither is measured by what its own inputs may hide.
+    """
+    foot = replace(stated.footing, train=training_pieces(read.model))
+    again = _begun_at(read, read.model, foot, read.theta)
+    left = innovations(stated)
+    most = DOUBTED * left.ratio if fewer else 1.0 + (1.0 - OF_REST) * left.beyond
+    return again.holds and innovations(again).ratio <= most
 
 
 def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
@@ -105,9 +119,18 @@ def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> f
 
     Infinite where its simulation breaks down there.
     """
-    if not keys:
-        return innovations(base).ratio
-    model = with_drive(base.model, with_additions(base, keys))
+    return _ratio_of(base, with_additions(base, keys), final) if keys else innovations(base).ratio
+
+
+def _ratio_as(base: FittedModel, final: FittedModel) -> float:
+    """Return the power of the innovations of the final model, its inputs read as those of the base model."""
+    drive, read = final.model.problem.drive, {item.name: item.hold for item in base.model.problem.drive.inputs}
+    channels = tuple(replace(item, hold=read.get(item.name, item.hold)) for item in drive.channels)
+    return _ratio_of(base, replace(drive, channels=channels), final)
+
+
+def _ratio_of(base: FittedModel, drive: Drive, final: FittedModel) -> float:
+    model = with_drive(base.model, drive)
     known = {**base.values, **final.values}
     fitted = _begun_at(base, model, base.footing, model.space.clip(model.space.with_known(known)))
     return innovations(fitted).ratio if fitted.holds else np.inf

@@ -31,6 +31,7 @@ from friction_ocp.diagnosis.stand_ins import fall_short, helps
 from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
 from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, required, samples, shapes, shortlist
 from friction_ocp.effects.effect import Key
+from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution
 
@@ -69,6 +70,8 @@ class Search:
     """Rounds that no longer count, with what they had added."""
     cut_short: bool = False
     """Whether the search ended at its limit of effort, with things left to try."""
+    outdone: Problem | None = None
+    """The problem with its inputs read another way, where that alone does more than any addition: no more is tried."""
     _begun: int = 0
     _compared: tuple[FittedModel, FreeErrors, FreeErrors] | None = None
     """The current model that free runs were last compared for, and these."""
@@ -114,7 +117,10 @@ class Search:
                 done = self._round(self.bench, self.accepted, self.meant)
             if done.accepted is None and done.excess.significant(self.level):
                 done = self._in_its_shape(done) or self._elsewhere() or done
+            self.outdone = None if self.rounds else self._read_better(done)
             self.rounds.append(done)
+            if self.outdone is not None:
+                return
             if done.accepted is None:
                 break
             self._take(done.accepted)
@@ -135,6 +141,19 @@ class Search:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
         noise = not first.excess.significant(self.level)
         return noise and (bool(first.choice.rivals) or significant(self.bench.slow, self.level))
+
+    def _read_better(self, first: Round) -> Problem | None:
+        """Return the problem with its inputs read another way, if that does more than any addition of the first round.
+
+        Without a parameter more it has to be worth an addition.
+        """
+        if self.readings is None or not first.excess.significant(self.level):
+            return None
+        current = self.bench.current
+        enough = current.cost - required(self.bench.base, current)
+        reached = min([enough, *(rival.standing.cost for rival in first.choice.rivals)])
+        ends = [(end.cost, problem) for problem, end in self.readings.fitted(self.bench.base) if end.cost < reached]
+        return min(ends, key=lambda pair: pair[0], default=(0.0, None))[1]
 
     def _better_base(self) -> bool:
         """Look for a better fit of the base model; whether there is one."""

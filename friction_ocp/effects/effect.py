@@ -49,7 +49,7 @@ class Track:
     """One recording as the fitted drive passes through it."""
 
     time: FloatArray
-    """(n,) s."""
+    """(n,) s, since what changes with time began."""
     theta: Mapping[str, FloatArray]
     """By shaft, rad."""
     omega: Mapping[str, FloatArray]

@@ -30,33 +30,39 @@ from friction_ocp.parameters import Free, start_of
 
 
 def wave(
-    stem: str, size: float, periods: list[float], apart: Sequence[str] = ()
-) -> tuple[list[Free], dict[str, float], tuple[Trial, ...]]:
-    """Return free cosine, sine and period of a wave, its off values and a trial for each period.
+    stem: str, size: float, waves: Sequence[Likely], apart: Sequence[str] = ()
+) -> tuple[dict[str, Any], dict[str, float], tuple[Trial, ...]]:
+    """Return the numbers of a wave by name, their off values by path and a trial for each of some likely waves.
 
-    `stem` is what the paths of its numbers begin with; `apart` are recordings that have a phase each, if they have.
+    `stem` is what the paths of its numbers begin with; `apart` are recordings that have a phase each, if they have: the
+    wave then has one size, and is counted from a crest in each.
     """
-    period = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
-    names = named([f"{stem}{part}" for part in ("cosine", "sine")], apart)
-    trials = tuple(Trial(tuple({name: size} for name in names), {f"{stem}period": each}) for each in periods)
-    return [amplitude(size, apart)] * 2 + [period], dict.fromkeys(names, 0.0), trials
+    periods = [one.period for one in waves]
+    numbers: dict[str, Any] = {"cosine": either_way(size), "sine": either_way(size)}
+    numbers["period"] = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
+    if apart:
+        numbers |= {"sine": 0.0, "origin": _of_each(periods[0])}
+    names = [f"{stem}{part}" for part in ("cosine", "sine") if isinstance(numbers[part], Free)]
+    fixed = [
+        {f"{stem}period": one.period, **{f"{stem}origin@{name}": one.crests.get(name, 0.0) for name in apart}}
+        for one in waves
+    ]
+    trials = tuple(Trial(tuple({name: size} for name in names), values) for values in fixed)
+    return numbers, dict.fromkeys(names, 0.0), trials
 
 
-def amplitude(size: float, apart: Sequence[str]) -> Free:
-    """Return a cosine or sine part, of each recording where these are `apart`."""
-    return replace(either_way(size), scope="recording") if apart else either_way(size)
-
-
-def named(paths: Sequence[str], apart: Sequence[str]) -> list[str]:
-    """Return the names of fitted numbers: of each recording where these are `apart`."""
-    return [f"{path}@{name}" for path in paths for name in apart] if apart else list(paths)
+def _of_each(period: float) -> Free:
+    """Return the place from which each recording counts a wave of about some period."""
+    return Free(STEP * period, scope="recording")
 
 
 def has_own(part: Wave) -> bool:
     """Whether a wave has a phase in each recording."""
-    return isinstance(part.cosine, Free) and part.cosine.scope == "recording"
+    return isinstance(part.origin, Free) and part.origin.scope == "recording"
 
 
+STEP = 0.1
+"""Share of a period by which the place from which a wave is counted is moved to see what comes of it."""
 FURTHER = 0.1
 """Size of a trial overtone, or of a wave of another period, over the wave's own."""
 SUBHARMONIC = 2.0
@@ -70,28 +76,29 @@ def set_apart(
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave that has a phase in each recording, the values of the one that it had, and a trial."""
     now = _found(part, path, clues)
-    size = math.hypot(*now.values()) or FURTHER
-    off = {f"{path}.{kind}@{name}": value for kind, value in now.items() for name in apart}
-    trial = Trial(tuple({name: value + size} for name, value in off.items()))
-    return replace(part, **dict.fromkeys(now, amplitude(size, apart))), off, (trial,)
+    size, period = math.hypot(*now.values()) or FURTHER, clues.numbers.get(f"{path}.period", start_of(part.period))
+    crest = math.atan2(now["sine"], now["cosine"]) * period / (2.0 * math.pi)
+    origins = {f"{path}.origin@{name}": crest for name in apart}
+    trial = Trial(tuple({name: value + STEP * period} for name, value in origins.items()))
+    moved = replace(part, cosine=either_way(size), sine=0.0, origin=_of_each(period))
+    return moved, {**origins, f"{path}.cosine": size}, (trial,)
 
 
 def overtones(part: Any, path: str, clues: Clues) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave with free overtones, at half and at a third of its period, their off values and a trial."""
-    size, apart = _further_size(part, path, clues), clues.recordings if has_own(part) else ()
+    size = _further_size(part, path, clues)
     kinds = [f"{order}_{kind}" for order in ("second", "third") for kind in ("cosine", "sine")]
-    names = named([f"{path}.{kind}" for kind in kinds], apart)
+    names = [f"{path}.{kind}" for kind in kinds]
     trial = Trial(tuple({name: size} for name in names))
-    return replace(part, **dict.fromkeys(kinds, amplitude(size, apart))), dict.fromkeys(names, 0.0), (trial,)
+    return replace(part, **dict.fromkeys(kinds, either_way(size))), dict.fromkeys(names, 0.0), (trial,)
 
 
 def other_wave(
-    part: Any, path: str, clues: Clues, periods: list[float]
+    part: Any, path: str, clues: Clues, waves: Sequence[Likely], apart: Sequence[str] = ()
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
-    """Return a wave with a free one of another period beside it, off values and a trial for each period."""
-    apart = clues.recordings if has_own(part) else ()
-    (cosine, sine, period), off, trials = wave(f"{path}.other_", _further_size(part, path, clues), periods, apart)
-    return replace(part, other_cosine=cosine, other_sine=sine, other_period=period), off, trials
+    """Return a wave with a free one of another period beside it, off values and a trial for each likely one."""
+    numbers, off, trials = wave(f"{path}.other_", _further_size(part, path, clues), waves, apart)
+    return replace(part, **{f"other_{name}": value for name, value in numbers.items()}), off, trials
 
 
 def _further_size(part: Any, path: str, clues: Clues) -> float:
@@ -106,10 +113,12 @@ def _found(part: Any, path: str, clues: Clues) -> dict[str, float]:
 class AbstractWaveEffect(AbstractEffect):
     """A wave that a part of the drive lacks; once one was accepted, with overtones and a wave of another period.
 
-    It has a phase in each recording where these show that; also once one was accepted.
+    It has a phase in each recording where these show that; also once one was accepted. A wave of another period has one
+    of its own only where `over_time`: that of an angle is counted from the same zero.
     """
 
     kind: ClassVar[type[Wave]]
+    over_time: ClassVar[bool] = False
 
     @abstractmethod
     def there(self, drive: Drive, place: str) -> tuple[Any, str]:
@@ -125,18 +134,18 @@ class AbstractWaveEffect(AbstractEffect):
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         path, (size, found) = self.there(drive, place)[1], self.size_and_waves(drive, place, clues)
-        numbers, off, trials = wave(f"{path}.", size, [one.period for one in found], clues.apart(found))
-        return Augmentation(self.with_wave(drive, place, self.kind(*numbers)), off, trials)
+        numbers, off, trials = wave(f"{path}.", size, found, clues.apart(found))
+        return Augmentation(self.with_wave(drive, place, self.kind(**numbers)), off, trials)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         part, path = self.there(drive, place)
         if part is None or (part.has_overtones and part.has_other):
             return None
         period = clues.numbers.get(f"{path}.period", start_of(part.period))
-        _, waves = self.size_and_waves(drive, place, clues)
-        found, apart = [one.period for one in waves], clues.apart(waves)
+        _, found = self.size_and_waves(drive, place, clues)
+        apart = clues.apart(found)
         plain = not (has_own(part) or part.has_overtones or part.has_other)
-        if plain and apart and abs(found[0] / period - 1.0) < SAME_PERIOD:
+        if plain and apart and abs(found[0].period / period - 1.0) < SAME_PERIOD:
             part, off, trials = set_apart(part, path, clues, apart)
             return Augmentation(self.with_wave(drive, place, part), off, trials)
         off, trials = dict[str, float](), tuple[Trial, ...]()
@@ -144,8 +153,9 @@ class AbstractWaveEffect(AbstractEffect):
             part, off, trials = overtones(part, path, clues)
         if not part.has_other:
             known = [period / order for order in (1, 2, 3)]
-            strange = [one for one in found if all(abs(one / other - 1.0) > SAME_PERIOD for other in known)]
-            part, none, further = other_wave(part, path, clues, strange or [SUBHARMONIC * period])
+            strange = [one for one in found if all(abs(one.period / other - 1.0) > SAME_PERIOD for other in known)]
+            own = clues.recordings if has_own(part) and self.over_time else ()
+            part, none, further = other_wave(part, path, clues, strange or [Likely(SUBHARMONIC * period)], own)
             off, trials = off | none, trials + further
         return Augmentation(self.with_wave(drive, place, part), off, trials)
 
@@ -224,6 +234,7 @@ class PeriodicDisturbanceEffect(AbstractWaveEffect):
     name: ClassVar[str] = "periodic_disturbance"
     sentence: ClassVar[str] = "an external torque periodic in time"
     kind: ClassVar[type[Wave]] = Disturbance
+    over_time: ClassVar[bool] = True
 
     def places(self, drive: Drive) -> Iterable[str]:
         return [item.name for item in moving_shafts(drive) if item.disturbance is None]

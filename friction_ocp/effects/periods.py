@@ -50,7 +50,11 @@ class Likely:
     """Whether each recording has it with a phase of its own: the zero of an encoder may lie anywhere when that is
     switched on, and what comes from outside does not wait for a recording to begin."""
     crests: Mapping[str, float] = field(default_factory=dict[str, float])
-    """By recording, where these are apart: a place at which the wave is highest, rad or s."""
+    """By recording: the place amid it at which the wave is highest with a phase of its own, rad or s."""
+
+    def beginning(self, recording: str) -> float:
+        """Return where periods begin along a recording: at a crest where phases differ."""
+        return self.crests.get(recording, 0.0) if self.apart else 0.0
 
 
 def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
@@ -76,7 +80,7 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
     step, each = 0.5 / max(travel, 1e-300), _by_recording(seen)
     sharp = [_sharpened(each, float(frequencies[k]), step) for k in peaks(power, beyond)]
     return [
-        Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each} if apart else {})
+        Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each})
         for frequency, apart in dict.fromkeys(sharp)
     ]
 
@@ -135,11 +139,12 @@ def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[fl
 
 
 def _crest(one: Seen, frequency: float) -> float:
-    """Return a place at which the wave of a frequency is highest along a recording."""
-    turns = 2.0 * np.pi * frequency * one.place
+    """Return the place amid a recording at which the wave of a frequency is highest."""
+    amid = 0.5 * float(np.min(one.place) + np.max(one.place))
+    turns = 2.0 * np.pi * frequency * (one.place - amid)
     basis = one.factor[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
     cosine, sine = np.linalg.lstsq(basis, one.beyond, rcond=None)[0]
-    return float(np.arctan2(sine, cosine) / (2.0 * np.pi * frequency))
+    return amid + float(np.arctan2(sine, cosine) / (2.0 * np.pi * frequency))
 
 
 def _by_recording(seen: Sequence[Seen]) -> list[Seen]:

@@ -82,7 +82,7 @@ def _parts(drive: Drive) -> dict[str, tuple[str, ...]]:
 
 def _numbers(fixed: dict[str, float], part: str, keys: tuple[str, ...]) -> list[str]:
     stems = tuple(f"{part}.{key}" for key in keys)
-    shapes = (".delta", ".omega_zero", ".phase", ".period", ".other_period", ".reference_temperature")
+    shapes = (".delta", ".omega_zero", ".phase", "period", "origin", ".reference_temperature")
     return [path for path in fixed if path.startswith(stems) and not path.endswith(shapes)]
 
 

@@ -82,10 +82,11 @@ def test_a_disturbance_does_not_wait_for_recordings(tmp_path: Path) -> None:
     assert values["motor.disturbance.period"] == pytest.approx(PERIOD, rel=1e-3)
     values |= {f"{path}@c": value for path, value in result["gap"]["own_values"]["c"].items()}
     for name, phase in zip("abc", (0.3, 2.1, 4.0), strict=True):
-        cosine, sine = (values[f"motor.disturbance.{part}@{name}"] for part in ("cosine", "sine"))
-        assert complex(cosine, sine) == pytest.approx(SIZE * np.exp(1j * phase), abs=0.1 * SIZE)
+        crest = 2.0 * np.pi * values[f"motor.disturbance.origin@{name}"] / values["motor.disturbance.period"]
+        torque = values["motor.disturbance.cosine"] * np.exp(1j * crest)
+        assert complex(torque) == pytest.approx(SIZE * np.exp(1j * phase), abs=0.1 * SIZE)
     assert result["gap"]["shrink"]["overall"] > 0.99
-    own = "every recording has its own motor.disturbance.cosine"
+    own = "every recording has its own motor.disturbance.origin"
     assert any(line.startswith(own) for line in result["assumptions"])
     again = simulate(load_problem(tmp_path / "out" / "augmented.yaml"))
     errors, _ = again.validation_errors["position"]
@@ -95,7 +96,9 @@ def test_a_disturbance_does_not_wait_for_recordings(tmp_path: Path) -> None:
     (tmp_path / "fresh.yaml").write_text(yaml.safe_dump(fresh), encoding="utf-8")
     afresh = simulate(load_problem(tmp_path / "fresh.yaml"))
     assert afresh.train_errors["position"][0].rms == pytest.approx(errors.rms, rel=0.05)
-    assert afresh.train[0].own == pytest.approx(result["gap"]["own_values"]["c"], abs=1e-4)
+    (path, origin), (kept, known) = *afresh.train[0].own.items(), *result["gap"]["own_values"]["c"].items()
+    turns = (origin - known) / values["motor.disturbance.period"]
+    assert (path, turns - round(turns)) == (kept, pytest.approx(0.0, abs=1e-3))
 
 
 @pytest.mark.slow
@@ -113,9 +116,10 @@ def test_cogging_is_found_behind_an_encoder_that_begins_at_zero(tmp_path: Path) 
     (accepted,) = result["accepted"]
     assert (accepted["effect"], result["verdict"]) == ("cogging", "explained")
     values = {name: item["value"] for name, item in accepted["parameters"].items()}
-    for name in "ab":
-        size = np.hypot(*(values[f"motor.cogging.{part}@{name}"] for part in ("cosine", "sine")))
-        assert size == pytest.approx(COGS, rel=0.1)
+    assert abs(values["motor.cogging.cosine"]) == pytest.approx(COGS, rel=0.1)
+    for name, phase in zip("ab", (0.3, 2.1), strict=True):
+        angle = TEETH * values[f"motor.cogging.origin@{name}"] - phase
+        assert np.sign(values["motor.cogging.cosine"]) * np.cos(angle) > 0.95
 
 
 def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path) -> None:

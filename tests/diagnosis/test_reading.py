@@ -44,9 +44,9 @@ def test_an_effect_is_found_beside_it(tmp_path: Path) -> None:
     assert found(tmp_path, law="stribeck", tau_s=0.15, omega_s=6.0).accepted == (("stribeck", "motor"),)
 
 
-def servo(folder: Path) -> Path:
+def servo(folder: Path, effects: tuple[str, ...], **friction: object) -> Path:
     """Write runs of a servo that is told its goal once a log line, and a file that does not say that it is held."""
-    law = PlantFriction(law="coulomb_viscous", tau_c=COULOMB, viscous=DAMPED)
+    law = PlantFriction(**{"law": "coulomb_viscous", "tau_c": COULOMB, "viscous": DAMPED, **friction})
     plant = Plant(
         shafts=(PlantShaft("motor", INERTIA, law),),
         motors=(PlantMotor("motor", "motor", torque_constant=TORQUE_CONSTANT, controller="loop"),),
@@ -74,7 +74,7 @@ def servo(folder: Path) -> Path:
             "position": {"measures": "motor.theta", "resolution": ENCODER_STEP},
         },
         "recordings": {"train": ["a.h5", "b.h5"], "validation": ["c.h5"]},
-        "diagnosis": {"effects": ["stribeck", "drive_lag", "sensor_delay", "quadratic_drag"]},
+        "diagnosis": {"effects": list(effects)},
     }
     path = folder / "problem.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
@@ -84,8 +84,17 @@ def servo(folder: Path) -> Path:
 @pytest.mark.slow
 def test_a_held_goal_is_no_lag(tmp_path: Path) -> None:
     """A servo that follows its goal in steps has no lag that its model lacks."""
-    seen = diagnose(load_problem(servo(tmp_path)))
+    seen = diagnose(load_problem(servo(tmp_path, ("stribeck", "drive_lag", "sensor_delay", "quadratic_drag"))))
     assert seen.verdict == "no_gap"
+    assert any(text.startswith("goal: is held") for text in diagnosis_document(seen)["assumptions"])
+
+
+@pytest.mark.slow
+def test_a_held_goal_is_told_beside_what_nothing_explains(tmp_path: Path) -> None:
+    """Read like that the model leaves less, though what is missing is none of the candidates; and it is no lag."""
+    friction = {"law": "stribeck", "tau_s": 1.2 * COULOMB, "omega_s": 3.0}
+    seen = diagnose(load_problem(servo(tmp_path, ("drive_lag", "quadratic_drag"), **friction)))
+    assert seen.verdict == "unknown_effect" and "drive_lag" not in dict(seen.accepted)
     assert any(text.startswith("goal: is held") for text in diagnosis_document(seen)["assumptions"])
 
 

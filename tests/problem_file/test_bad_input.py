@@ -261,7 +261,8 @@ MODEL_FAULTS: dict[str, tuple[Callable[[Content], None], str]] = {
     "unknown key of a term": (
         put("drive/motor/cogging", {"cosine": 0.1, "sine": 0, "perod": 1}),
         "drive.motor.cogging.perod: unknown key 'perod'; available: cosine, sine, period, second_cosine, second_sine, "
-        "third_cosine, third_sine, other_cosine, other_sine, other_period; did you mean 'period'?",
+        "third_cosine, third_sine, other_cosine, other_sine, other_period, origin, other_origin; did you mean "
+        "'period'?",
     ),
     "further wave without a period": (
         put("drive/motor/cogging", {"cosine": 0.1, "sine": 0, "period": 1, "other_sine": 0.1}),

@@ -25,8 +25,8 @@ def further_waves_have_periods(case: Case) -> Iterator[Finding]:
     """A wave beside that of `period` has a period of its own, and is none without an amplitude."""
     parts = ("other_cosine", "other_sine")
     for stem in dict.fromkeys(path.rpartition(".")[0] for path in case.numbers if ".other_" in path):
-        there = [key for key in (*parts, "other_period") if f"{stem}.{key}" in case.numbers]
-        waves, periodic = there[0] in parts, there[-1] == "other_period"
+        there = [key for key in (*parts, "other_period", "other_origin") if f"{stem}.{key}" in case.numbers]
+        waves, periodic = there[0] in parts, "other_period" in there
         if waves and periodic:
             continue
         missing = "other_cosine or other_sine" if periodic else "other_period"
