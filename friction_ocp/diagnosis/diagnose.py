@@ -19,7 +19,7 @@ from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.predicted import LEAST_SHARE, led_by_predictions
-from friction_ocp.diagnosis.reading import explains_more, leaves_less
+from friction_ocp.diagnosis.reading import explains_more, is_needless, leaves_less
 from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
@@ -189,7 +189,9 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     readings, began = OtherReadings(problem), time.perf_counter()
     search = _searched(problem, tell, execution, readings)
     if search.outdone is not None:
-        return _read_as(search.outdone, problem, tell, execution, search.effort, began)
+        read = _read_as(search.outdone, problem, tell, execution, search.effort, began)
+        needless = is_needless(search.bench.base, read.final)
+        return _concluded(problem, _searched(problem, tell, execution), began) if needless else read
     stated = _concluded(problem, search, began)
     if not stated.gap:
         return stated

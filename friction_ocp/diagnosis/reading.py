@@ -114,6 +114,11 @@ def leaves_less(read: FittedModel, stated: FittedModel, fewer: bool) -> bool:
     return again.holds and innovations(again).ratio <= most
 
 
+def is_needless(stated: FittedModel, final: FittedModel) -> bool:
+    """Whether a final model whose inputs are read otherwise leaves no more where they are read as stated."""
+    return _ratio_as(stated, final) <= DOUBTED * innovations(final).ratio
+
+
 def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
     """Return the power of the innovations of a base model with some additions, fitted from where they were before.
 
