@@ -13,7 +13,7 @@ from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, carries_over, free_errors, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, comes_closer, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
@@ -105,12 +105,17 @@ class Diagnosis:
         """Whether free runs of recordings that took no part come closer, or there is nothing to shrink."""
         shown = any(item.excess.significant(self.level) for item in (*self.rounds, *self.superseded))
         shown |= any(effect not in STATED for effect, _ in self.accepted)
-        return not (self.accepted and shown) or carries_over(self.before, self.after, self.problem.estimation.seed)
+        return not (self.accepted and shown) or comes_closer(self.before, self.after, self.problem.estimation.seed)
 
     @cached_property
     def stray(self) -> bool:
-        """Whether free runs come no closer, and noise alone sets runs of the final model as far apart."""
-        return not self._comes_closer and strays_as_far(self.final, self.after, self.problem.estimation.seed)
+        """Whether free runs come no closer, and noise alone sets runs of the final model as far apart.
+
+        As torque noise may take them from where they are, or as noise of the recordings does that is simulated.
+        """
+        if self._comes_closer:
+            return False
+        return self.after.drowned or strays_as_far(self.final, self.after, self.problem.estimation.seed)
 
     @cached_property
     def lost(self) -> bool:

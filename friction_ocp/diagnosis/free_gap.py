@@ -138,11 +138,6 @@ def comes_closer(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
     return after.excess() <= DOUBTED - 1.0 or shrink(before, after, seed).interval95[0] > 0.0
 
 
-def carries_over(before: FreeErrors, after: FreeErrors, seed: int) -> bool:
-    """Whether free runs come closer than before, or as close as torque noise lets them, whatever the model."""
-    return after.drowned or comes_closer(before, after, seed)
-
-
 def _share(before: float, after: float) -> float:
     return 1.0 - after / before if before > 0 else 0.0
 

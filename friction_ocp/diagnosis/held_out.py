@@ -13,6 +13,7 @@ from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.own_numbers import fitted_again
 from friction_ocp.estimation.program import Point, Program, Tether
 from friction_ocp.estimation.quadratic import bounded_step
 from friction_ocp.simulation.grid import BoolArray, FloatArray
@@ -42,12 +43,13 @@ def held_out(fitted: FittedModel) -> FloatArray:
     """
     program = fitted.linear.program
     costs: dict[int, FloatArray] = {}
+    own = ["@" in name for name in fitted.model.space.names]
     for group in folds(fitted):
         theta = fitted_without(fitted, group)
         for k in group:
             item = fitted.linear.recordings[k]
             alone, (wider,) = with_own_noise(_only(program, k), fitted.model, fitted.footing, theta)
-            nodes = item.nodes + item.moved_by(theta - fitted.theta)
+            nodes = item.nodes + item.moved_by(np.where(own, 0.0, theta - fitted.theta))
             point = solve_nodes(alone, Point(theta, (nodes,)), STEPS_OF_NODES)
             prices = gap_prices(item, alone.segments[0], wider)
             costs[k] = told(raw_costs(alone, point, prices))
@@ -96,7 +98,14 @@ def _step_without(fitted: FittedModel, left: BoolArray, kept: FloatArray) -> tup
 
 
 def fitted_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
-    """Return the parameters fitted to all recordings but some."""
+    """Return the parameters fitted to all recordings but some; what each of these has for itself, to that alone."""
+    items = fitted.linear.program.experiments
+    there = {item.name for k, item in enumerate(items) if k not in group}
+    gone = [items[k] for k in group if items[k].name not in there]
+    return fitted_again(fitted.model, gone, _shared_without(fitted, group))
+
+
+def _shared_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
     rows, program, point = fitted.linear.rows, fitted.linear.program, fitted.linear.point
     others = [k for k in range(len(program.experiments)) if k not in group]
     if not others or not fitted.theta.size:

@@ -2,17 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from friction_ocp.diagnosis.bench import Bench, value_of
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, left_out_errors
 from friction_ocp.diagnosis.held_out import fitted_without, folds
+from friction_ocp.diagnosis.stand_ins import fall_short, helps
+from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.execution.plain import plain, restored
 from friction_ocp.execution.run import run_tasks
 from friction_ocp.execution.task import Json, Task
 from friction_ocp.statistics.execution import Execution
 
 
-def left_out_before_and_after(bench: Bench, run: Execution) -> tuple[FreeErrors, FreeErrors]:
-    """Return free runs of recordings left out, of the base model of a bench and of its current one."""
+@dataclass
+class LeftOut:
+    """What free runs of training recordings that take no part say of the current model of a bench.
+
+    What was looked at for the model that was last asked about is kept.
+    """
+
+    run: Execution
+    _runs: tuple[FittedModel, FreeErrors, FreeErrors] | None = None
+    _stray: tuple[FittedModel, bool] | None = None
+
+    def errors(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
+        """Return those of the base model and of the current one."""
+        if self._runs is None or self._runs[0] is not bench.current:
+            self._runs = (bench.current, *_before_and_after(bench, self.run))
+        return self._runs[1:]
+
+    def stray(self, bench: Bench) -> bool:
+        """Whether noise alone sets free runs of the current model as far apart."""
+        if self._stray is None or self._stray[0] is not bench.current:
+            _, after = self.errors(bench)
+            far = strays_as_far(bench.current, after, bench.problem.estimation.seed, held_out=False)
+            self._stray = (bench.current, far)
+        return self._stray[1]
+
+    def fall_short(self, bench: Bench) -> bool:
+        """Whether a notable part of their gap is left, and noise does not make it."""
+        return fall_short(*self.errors(bench)) and not self.stray(bench)
+
+    def helps(self, bench: Bench, level: float) -> bool:
+        """Whether what the current model has and the base model lacks takes a part of the gap, and of theirs."""
+        return helps(bench.base, bench.current, level, lambda: self.errors(bench), lambda: self.stray(bench))
+
+
+def _before_and_after(bench: Bench, run: Execution) -> tuple[FreeErrors, FreeErrors]:
     parts = range(len(folds(bench.base)))
     tasks = {
         (of_base, k): Task(f"left-out-{'base' if of_base else 'current'}-{k}", parameters_without, (of_base, k))

@@ -14,11 +14,9 @@ from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
-from friction_ocp.diagnosis.left_out import left_out_before_and_after
+from friction_ocp.diagnosis.left_out import LeftOut
 from friction_ocp.diagnosis.options import NONE, Considered, places
 from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
@@ -27,7 +25,6 @@ from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import significant
-from friction_ocp.diagnosis.stand_ins import fall_short, helps
 from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
 from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, required, samples, shapes, shortlist
 from friction_ocp.effects.effect import Key
@@ -73,11 +70,10 @@ class Search:
     outdone: Problem | None = None
     """The problem with its inputs read another way, where that alone does more than any addition: no more is tried."""
     _begun: int = 0
-    _compared: tuple[FittedModel, FreeErrors, FreeErrors] | None = None
-    """The current model that free runs were last compared for, and these."""
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
+        self._left_out = LeftOut(self.run)
         base, before, began = self.bench.base.linear, effort(), time.perf_counter()
         base.program.linearise(base.point)
         self._first, once, took = effort(), effort() - before, time.perf_counter() - began
@@ -126,7 +122,7 @@ class Search:
             self._take(done.accepted)
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
-                if not fall_short(*self._left_out(self.bench)):
+                if not self._left_out.fall_short(self.bench):
                     break
             if self._exhausted():
                 break
@@ -134,7 +130,7 @@ class Search:
         if unknown and len(set(self.accepted)) > 1:
             current, self.accepted = without_small(self.bench, self.accepted)
             self.bench = self.bench.at(current)
-        if self.accepted and not self._helps(self.bench):
+        if self.accepted and not self._left_out.helps(self.bench, self.level):
             self._withdraw()
 
     def _seems_missing(self, first: Round) -> bool:
@@ -330,15 +326,6 @@ class Search:
         self.bench, self.rounds = self.bench.at(current), [*dropped, *own]
         self.accepted = [item.accepted.key for item in own if item.accepted is not None]
 
-    def _left_out(self, bench: Bench) -> tuple[FreeErrors, FreeErrors]:
-        """Return free runs where recordings took no part, of the base model and of the current one of a bench."""
-        if self._compared is None or self._compared[0] is not bench.current:
-            self._compared = (bench.current, *left_out_before_and_after(bench, self.run))
-        return self._compared[1:]
-
-    def _helps(self, bench: Bench) -> bool:
-        return helps(bench.base, bench.current, self.level, lambda: self._left_out(bench))
-
     def _withdraw(self) -> None:
         """Take back what does not help, for what the recordings could not tell from the first addition and does.
 
@@ -350,7 +337,7 @@ class Search:
             if rival.key in tried:
                 continue
             bench = self._with(rival)
-            if self._helps(bench):
+            if self._left_out.helps(bench, self.level):
                 held = replace(first, choice=with_first(first.choice, rival), accepted=rival)
                 self.bench, self.rounds, self.accepted = bench, [held], [rival.key]
                 return

@@ -17,20 +17,26 @@ NOTABLE_REST = 0.25
 
 
 def helps(
-    base: FittedModel, current: FittedModel, level: float, left_out: Callable[[], tuple[FreeErrors, FreeErrors]]
+    base: FittedModel,
+    current: FittedModel,
+    level: float,
+    left_out: Callable[[], tuple[FreeErrors, FreeErrors]],
+    stray: Callable[[], bool],
 ) -> bool:
     """Whether what the current model has and the base model lacks takes a part of the gap, and of that of free runs.
 
     `left_out` returns free runs of both where training recordings took no part in the fits. What does next to nothing
     for them is no more than a shadow, be it most of the gap where it was fitted: of what goes there half the share has
-    to go here, for certain; of what leaves no more than noise a part. Free runs that are lost say nothing, and against
-    what takes almost all, yet not all, no more than that something else is missing. Where models are compared by short
-    predictions free runs go astray whatever is added, and are not asked.
+    to go here, for certain; of what leaves no more than noise a part, unless free runs of the current model `stray` as
+    far where noise alone sets them apart. Free runs that are lost say nothing, and against what takes almost all, yet
+    not all, no more than that something else is missing. Where models are compared by short predictions free runs go
+    astray whatever is added, and are not asked.
     """
     predicted = current.footing.predicted
     if not predicted and not innovations(current).significant(level):
         before, after = left_out()
-        return before.lost or after.drowned or after.excess() <= max(DOUBTED - 1.0, (1.0 - PART) * before.excess())
+        told = before.lost or after.drowned
+        return told or after.excess() <= max(DOUBTED - 1.0, (1.0 - PART) * before.excess()) or stray()
     taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
     if taken < PART * whole:
         return False

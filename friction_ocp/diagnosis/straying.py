@@ -21,16 +21,17 @@ DRAWS = 19
 """Draws of the noise: the largest of them is passed by one in twenty of the same kind."""
 
 
-def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int) -> bool:
-    """Whether runs that noise sets apart part by as much as free runs of the model err: on what was held out, at 95 %.
+def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, held_out: bool = True) -> bool:
+    """Whether runs that noise sets apart part by as much as free runs err: of what was held out or fitted, at 95 %.
 
     A drive whose friction falls with speed, or that is about to stick, multiplies the least difference of its start and
     of its inputs: be its model as good as it may, its free runs tell little. Nothing is linearised: measurement and
     drive of the motors get as much noise again, and what follows is simulated.
     """
     model, rng, most = fitted.model, np.random.default_rng(seed), errors.excess()
-    uses = model.problem.validation or model.problem.train
-    plain = errors.runs if model.validation else simulate_recordings(model, model.train, fitted.theta)
+    held_out = held_out and bool(model.validation)
+    uses = model.problem.validation if held_out else model.problem.train
+    plain = errors.runs if held_out else simulate_recordings(model, model.train, fitted.theta)
     levels = {channel.name: input_noise(model, channel)[0] for _, channel, _ in driving(model.problem.drive, {})}
     levels |= dict(zip(model.drive.output_names, map(float, model.noise), strict=True))
     for _ in range(DRAWS):

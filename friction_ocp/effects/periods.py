@@ -20,6 +20,10 @@ SHARED, CHANCE = 0.75, 1e-3
 """Share of what waves with phases of their own take, up to which one phase for all recordings does not do, and the
 chance with which a difference is none. Under a large misfit periods are a little off, and phases then seem to differ:
 where one phase takes most it is tried, and set apart once that is accepted."""
+ALIKE, TWICE = 0.5 * (0.25 * np.pi + 1.0), 2.0
+"""Share of what waves of any sizes take, from which one size for all recordings that pass them twice is likely: noise
+alone, of Rayleigh's distribution, comes to pi / 4, and a wave to 1. What a model lacks that is no wave at all looks
+like one of another size, too, in every recording."""
 FINER = 4.0
 """Frequencies that are looked at in each cycle over the whole range of places, once a peak is known."""
 
@@ -63,7 +67,7 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
     Frequencies are looked at half a cycle apart over the longest stretch, up to half a cycle from place to place at
     typical speed. Where these are too many, stretches are cut until they are not: a long way has many cycles, and a few
     of them show a period nearly as well. What they show is sharpened along all recordings with one phase, and along
-    each, and told by an F test and by how much it takes whether they have one.
+    each, and told by an F test, by how much it takes and by its sizes whether they have one.
     """
     seen = [one for one in seen if one.place.size >= FEWEST]
     steps = [np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen]
@@ -119,8 +123,18 @@ def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[flo
     left = sum(one.place.size for one in each) - more - 3
     noise = (sum(float(np.sum(one.beyond**2)) for one in each) - own) / max(left, 1)
     chance = float(stats.f.sf((own - shared) / more / max(noise, 1e-300), more, max(left, 1)))
-    apart = chance < CHANCE and shared < SHARED * (own - more * noise)
+    apart = chance < CHANCE and shared < SHARED * (own - more * noise) and _of_one_size(each, differing)
     return (differing, True) if apart else (alike, False)
+
+
+def _of_one_size(each: Sequence[Seen], frequency: float) -> bool:
+    """Whether the waves of a frequency, with a phase in each recording, are likely to be of one size."""
+    passed = [one for one in each if np.ptp(one.place) * frequency >= TWICE]
+    at = np.array([frequency])
+    power = np.array([float(spectrum(one.place - one.place[0], one.beyond, one.factor, at)[0]) for one in passed])
+    weight = np.array([0.5 * float(np.sum(one.factor**2)) for one in passed])
+    alike = float(np.sum(np.sqrt(power * weight))) ** 2 / max(float(np.sum(weight)), 1e-300)
+    return len(passed) < 2 or alike >= ALIKE * float(np.sum(power))
 
 
 def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[float, float]:

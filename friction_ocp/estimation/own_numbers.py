@@ -42,10 +42,30 @@ def own_numbers(
     those = {use.name for use in model.problem.fitted} if fitted else set[str]()
     uses = {use.name: use for use in model.problem.recordings if use.name not in those}
     known = dict(zip(model.space.names, map(float, theta), strict=True))
-    shared = bind_drive(model.problem.drive, {path: known.get(path, value) for path, value in values.items()})
+    shared = _bound(model, known)
     asked = [item for item in experiments if item.name in uses]
     found = {item.name: _fitted(model, shared, uses[item.name], item, known) for item in asked}
     return {name: numbers for name, numbers in found.items() if numbers}
+
+
+def fitted_again(model: Model, experiments: Sequence[Experiment], theta: FloatArray) -> FloatArray:
+    """Return parameters with those that fitted recordings have for themselves as if these had taken no part."""
+    uses, found = {use.name: use for use in model.problem.train}, dict[str, float]()
+    for item in experiments:
+        own = {name for name in model.space.names if name.partition("@")[2] == item.name}
+        if own:
+            known = {
+                name: float(value) for name, value in zip(model.space.names, theta, strict=True) if name not in own
+            }
+            numbers = _fitted(model, _bound(model, known), uses[item.name], item, known)
+            found |= {f"{path}@{item.name}": value for path, value in numbers.items()}
+    return np.array([found.get(name, value) for name, value in zip(model.space.names, theta, strict=True)])
+
+
+def _bound(model: Model, known: Mapping[str, float]) -> Drive:
+    """Return the drive of a model with the numbers that are known by path, and so are no recording's own."""
+    values = {leaf.path: leaf.value for leaf in drive_leaves(model.problem.drive)}
+    return bind_drive(model.problem.drive, {path: known.get(path, value) for path, value in values.items()})
 
 
 def with_numbers(model: Model, own: Mapping[str, Mapping[str, float]]) -> Model:

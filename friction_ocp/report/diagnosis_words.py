@@ -26,10 +26,10 @@ def diagnosis_sentence(result: Json) -> str:
             known = "The model explains these recordings down to the noise, but not with the values that are stated"
             return f"{known}: {likely}{_listed(accepted)}."
         case "explained":
-            return f"The model lacked {_listed(accepted)}; with it {_closed(closed)}.{_stray(result)}"
+            return f"The model lacked {_listed(accepted)}{_stray(result) or f'; with it {_closed(closed)}.'}"
         case "undecided":
-            likely = f"most likely {_listed(accepted)}, with which {_closed(closed)}"
-            return f"There is a gap, and several causes fit it: {likely}.{_stray(result)}"
+            likely = f"most likely {_listed(accepted)}{_stray(result) or f', with which {_closed(closed)}.'}"
+            return f"There is a gap, and several causes fit it: {likely}"
         case _ if accepted and not _lost(result) and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
@@ -78,11 +78,11 @@ def _predicted(result: Json) -> str:
 
 
 def _stray(result: Json) -> str:
-    """Say that free runs part by themselves, where they do not come closer."""
+    """Say what additions do from sample to sample where free runs part by themselves, and do not come closer."""
     if not part(result, "remainder").get("stray"):
         return ""
     why = "noise of the start and of the inputs alone sets simulations of this drive as far apart"
-    return f" Free runs say little here: {why}, and the errors from sample to sample were judged."
+    return f". {_one_step(result)}. Free runs say little here: {why}."
 
 
 def _cut_short(result: Json) -> str:

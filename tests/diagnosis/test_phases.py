@@ -15,6 +15,8 @@ from plant import Plant, PlantRipple
 from friction_ocp.diagnosis.locate import shape
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.estimation.estimate import identify, simulate
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.own_numbers import fitted_again
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.result_folder import save
@@ -26,14 +28,14 @@ TEETH, COGS = 6, 0.05
 SAMPLES, INTERVAL = 4000, 1e-3
 
 
-def tracks(phases: tuple[float, ...]) -> tuple[Track, ...]:
-    """Return motors to and fro that lack a wave over their angle, of a phase each, beside noise."""
+def tracks(phases: tuple[float, ...], sizes: tuple[float, ...] = (0.1, 0.1, 0.1)) -> tuple[Track, ...]:
+    """Return motors to and fro that lack a wave over their angle, of a phase and a size each, beside noise."""
     rng, made = np.random.default_rng(11), list[Track]()
     time, middle = INTERVAL * np.arange(SAMPLES), np.arange(2, SAMPLES, 4)
     for k, phase in enumerate(phases):
         omega = 20.0 * np.sin(2.0 * np.pi * time / (1.0 + 0.1 * k))
         theta = INTERVAL * np.cumsum(omega)
-        torque = 0.1 * np.cos(TEETH * theta[middle] + phase) + 0.05 * rng.standard_normal(middle.size)
+        torque = sizes[k] * np.cos(TEETH * theta[middle] + phase) + 0.05 * rng.standard_normal(middle.size)
         missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
         moved = {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}
         made.append(Track(time, *moved, missing, missing, f"run-{k}"))
@@ -51,6 +53,12 @@ def test_recordings_tell_whether_they_share_a_phase(phases: tuple[float, ...], a
     assert 1.0 / known.periods("motor", "theta")[0] == pytest.approx(TEETH / (2.0 * np.pi), abs=0.5 / travel)
     found = shape(known, "motor")
     assert found is not None and found.variable == "motor.theta" and found.period is not None and found.share > 0.4
+
+
+def test_waves_of_another_size_in_every_recording_are_none_with_phases_of_their_own() -> None:
+    """Something else is missing that looks like them."""
+    known = Clues(tracks((0.4, 2.0, 4.0), (0.02, 0.03, 0.3)), {}, {"motor": 1.0})
+    assert known.apart(known.waves("motor", "theta")) == ()
 
 
 def written(folder: Path, plants: tuple[Plant, ...], effects: tuple[str, ...]) -> Path:
@@ -133,12 +141,18 @@ def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path)
     constant = {"guess": 0.0, "min": -COULOMB, "max": COULOMB, "scope": "recording"}
     document["drive"]["shafts"][0]["external_torque"] = {"constant": constant}
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    found = identify(load_problem(path))
+    problem = load_problem(path)
+    found = identify(problem)
     (held,) = found.simulation.validation
     name = "motor.external_torque.constant"
     values = {**found.values, f"{name}@c": held.own[name]}
     for recording, torque in zip("abc", torques, strict=True):
         assert values[f"{name}@{recording}"] == pytest.approx(torque, abs=2e-3)
+    model = prepare(problem)
+    far = model.space.with_known({**found.values, f"{name}@a": 0.9 * COULOMB})
+    again = dict(zip(model.space.names, fitted_again(model, model.train[:1], far), strict=True))
+    assert again[f"{name}@a"] == pytest.approx(torques[0], abs=2e-3)
+    assert again == {**found.values, f"{name}@a": again[f"{name}@a"]}
     train, validation = (
         one["position"][0].noise_ratio for one in (found.simulation.train_errors, found.simulation.validation_errors)
     )

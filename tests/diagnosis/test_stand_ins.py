@@ -36,7 +36,10 @@ def free_runs(excess: float, lost: bool = False, drowned: bool = False) -> Any:
 def test_an_addition_has_to_help_free_runs_too(
     monkeypatch: pytest.MonkeyPatch, noise: bool, taken: float, before: Any, after: Any, helps: bool
 ) -> None:
-    """What helps from sample to sample alone is taken back, unless free runs can say nothing or noise moves them."""
+    """What helps from sample to sample alone is taken back, unless free runs can say nothing or noise moves them.
+
+    Where noise is left, and alone sets free runs as far apart, they can say nothing either.
+    """
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
     foot = SimpleNamespace(predicted=False)
     base = SimpleNamespace(cost=100.0)
@@ -45,7 +48,9 @@ def test_an_addition_has_to_help_free_runs_too(
     monkeypatch.setattr(stand_ins, "innovations", lambda fitted: power)
     monkeypatch.setattr(stand_ins, "samples", lambda fitted: 0)
     monkeypatch.setattr(stand_ins, "comes_closer", lambda one, other, seed: other.excess() < one.excess())
-    assert stand_ins.helps(cast(Any, base), cast(Any, current), 0.01, lambda: (before, after)) == helps
+    pair = cast(Any, base), cast(Any, current)
+    assert stand_ins.helps(*pair, 0.01, lambda: (before, after), lambda: False) == helps
+    assert stand_ins.helps(*pair, 0.01, lambda: (before, after), lambda: True) == (helps or noise)
 
 
 def rival(key: Key, cost: float, determined: int) -> Any:

@@ -111,10 +111,14 @@ def test_free_runs_that_are_lost_in_any_case_are_no_evidence() -> None:
 
 @pytest.mark.parametrize("verdict", ["explained", "undecided"])
 def test_free_runs_that_part_by_themselves_are_told(verdict: str) -> None:
-    """They come no closer, and noise alone sets them as far apart."""
+    """They come no closer, and noise alone sets them as far apart: what goes from sample to sample is told."""
+    rounds = [{"excess": {"ratio": 152.0, "p_value": 0.0}}]
     for stray in (True, False):
-        said = diagnosis_sentence(result(verdict, accepted=[COGGING], remainder={"significant": False, "stray": stray}))
+        remainder = {"significant": False, "stray": stray, "ratio": 1.1}
+        said = diagnosis_sentence(result(verdict, accepted=[COGGING], remainder=remainder, rounds=rounds))
         assert ("Free runs say little here" in said) is stray
+        assert ("1.1 times the power of their noise with it, 152 times without" in said) is stray
+        assert ("of the excess error is gone" in said) is not stray
 
 
 def test_additions_that_were_taken_back_are_told_once_with_the_reason() -> None:
