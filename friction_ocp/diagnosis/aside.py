@@ -39,6 +39,8 @@ class OtherReadings:
         problems = other_readings(self.problem)
         if self._of is None or self._of != point_document(base):
             ends = [read_otherwise(other, base) for other in problems]
+            self._of = point_document(base)
+            self._found = [point_document(end) if end.holds else None for end in ends]
             return [(other, end) for other, end in zip(problems, ends, strict=True) if end.holds]
         points = zip(problems, self._found, strict=True)
         return [(other, _seated(other, base, point)) for other, point in points if point is not None]

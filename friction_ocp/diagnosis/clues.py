@@ -147,10 +147,8 @@ def _table(fitted: FittedModel, index: int, watch: _Watch) -> dict[str, FloatArr
 def _track(fitted: FittedModel, name: str, table: Mapping[str, FloatArray], missing: Missing, finely: Missing) -> Track:
     drive = fitted.model.problem.drive
     torque = {motor.name: table[f"{motor.name}.torque"] for motor in drive.motors}
-    (zero,) = {use.recording.zero for use in fitted.model.problem.recordings if use.name == name}
-    return Track(
-        table["time"] - zero, _of(drive, table, "theta"), _of(drive, table, "omega"), torque, missing, finely, name
-    )
+    since = table["time"] - next(use.recording.zero for use in fitted.model.problem.train if use.name == name)
+    return Track(since, _of(drive, table, "theta"), _of(drive, table, "omega"), torque, missing, finely, name)
 
 
 def _of(drive: Drive, table: Mapping[str, FloatArray], kind: str) -> dict[str, FloatArray]:

@@ -104,7 +104,6 @@ def leaves_less(read: FittedModel, stated: FittedModel, fewer: bool) -> bool:
     """Whether a model whose inputs are `read` otherwise leaves notably less than the `stated` one does.
 
     As much, but for the doubt about floors, is enough with `fewer` additions.
-
     By the noise that the stated footing assumes, so that neither is measured by what its own inputs may hide.
     """
     foot = replace(stated.footing, train=training_pieces(read.model))
