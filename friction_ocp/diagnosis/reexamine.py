@@ -217,13 +217,15 @@ def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection
     found later. One that was accepted since may do the work of both, in a more general shape.
     """
 
+    assert item.accepted is not None
+    own = item.accepted.key
+
     def open_to(key: Key) -> bool:
         times = accepted.count(key)
         return times == 0 or (times == 1 and may_grow(_drive(bench, [key]), key, clues_of(bench.base)))
 
-    others = [rival for rival in item.choice.rivals if rival.key not in seen and open_to(rival.key)]
+    others = [rival for rival in item.choice.rivals if rival.key not in {own, *seen} and open_to(rival.key)]
     others = sorted(others, key=lambda rival: rival.standing.cost)
-    assert item.accepted is not None
     held = item.accepted.standing
     most = (1.0 - MOST_OF) * item.before.cost + MOST_OF * held.cost
     simpler = [rival for rival in others[TRIED:] if rival.standing.determined < held.determined]

@@ -154,3 +154,24 @@ def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: P
     rounds[0] = replace(rounds[0], accepted=worthless, choice=replace(rounds[0].choice, rivals=rivals))
     _, told, _ = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
     assert sum(told[0].choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
+
+
+def test_what_may_grow_is_no_rival_of_itself(tmp_path: Path) -> None:
+    """Cogging, which may have overtones, keeps its probability when it is weighed again beside Stribeck friction."""
+    plant = axis(law="stribeck", tau_s=1.5 * COULOMB, omega_s=6.0)
+    cogging = PlantRipple(3.1, (0.2 * TORQUE_CONSTANT,), (0.0,))
+    plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
+    names = ("cogging", "quadratic_drag", "stribeck")
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), HERE)
+    waves, drag, falling = ((name, "motor") for name in names)
+    rounds, accepted = list[Round](), list[Key]()
+    for keys in ([waves, drag], [falling]):
+        rounds.append(round_of(bench, keys))
+        done = rounds[-1].accepted
+        assert done is not None
+        bench, accepted = bench.at(done.fitted), [*accepted, done.key]
+    _, told, kept = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
+    choice = told[0].choice
+    assert kept == [waves, falling]
+    assert sum(choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
+    assert choice.rivals[0].key == waves and choice.probabilities[0] > 1.0 - LEVEL
