@@ -228,14 +228,15 @@ def _place(result: Json) -> str:
 def _closed(closed: Json) -> str:
     """Say how much of the gap is gone where the candidate was not fitted, and when that is nothing to rely on."""
     overall, ends = float(closed["overall"]), [float(end) for end in closed["interval95"]]
-    low, high = (percent(end, 2) for end in ends)
+    digits = 3 if ends[1] > 0.99 else 2
+    low, high = (percent(end, digits) for end in ends)
     if ends[1] < 0.0:
         grown = f"{percent(-overall, 2)} ({percent(-ends[1], 2)} to {percent(-ends[0], 2)})"
         return f"the excess error on recordings left out grows by {grown}: do not rely on it"
     if ends[0] > NEARLY_ALL:
         return f"over {percent(NEARLY_ALL)} of the excess error is gone"
     doubt = "" if ends[0] > 0.0 else ", not certainly any"
-    return f"{percent(overall, 2)} of the excess error is gone ({low} to {high}{doubt})"
+    return f"{percent(overall, digits)} of the excess error is gone ({low} to {high}{doubt})"
 
 
 def _listed(items: Sequence[str]) -> str:

@@ -140,3 +140,10 @@ def test_a_search_that_ended_early_says_so() -> None:
         said = diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=True))
         assert said.endswith("a larger `effort` under `diagnosis:` (1 if none is stated) lets it go on.")
         assert "effort" not in diagnosis_sentence(result("unknown_effect", accepted=accepted, cut_short=False))
+
+
+def test_almost_all_is_not_told_as_all() -> None:
+    """Close to all of the gap is told more closely."""
+    closed = {"overall": 0.99932, "interval95": [0.99885, 0.99963]}
+    said = diagnosis_sentence(result("explained", accepted=[COGGING], gap={"shrink": closed}))
+    assert said.endswith("with it 99.9 % of the excess error is gone (99.9 % to 100.0 %).")
