@@ -38,10 +38,7 @@ class OtherReadings:
         """Return all other readings, and the base model fitted to each that can be simulated."""
         problems = other_readings(self.problem)
         if self._of is None or self._of != point_document(base):
-            ends = [read_otherwise(other, base) for other in problems]
-            self._of = point_document(base)
-            self._found = [point_document(end) if end.holds else None for end in ends]
-            return [(other, end) for other, end in zip(problems, ends, strict=True) if end.holds]
+            self._of, self._found = point_document(base), [_end(other, base) for other in problems]
         points = zip(problems, self._found, strict=True)
         return [(other, _seated(other, base, point)) for other, point in points if point is not None]
 
@@ -49,8 +46,12 @@ class OtherReadings:
 def read_base(bench: Bench, index: int) -> Json:
     """Fit the base model to another reading of the inputs; null where it cannot be simulated."""
     with uncounted():
-        fitted = read_otherwise(other_readings(bench.problem)[index], bench.base)
-        return point_document(fitted) if fitted.holds else None
+        return _end(other_readings(bench.problem)[index], bench.base)
+
+
+def _end(read: Problem, base: FittedModel) -> Json:
+    fitted = read_otherwise(read, base)
+    return point_document(fitted) if fitted.holds else None
 
 
 def _seated(problem: Problem, base: FittedModel, point: Json) -> FittedModel:

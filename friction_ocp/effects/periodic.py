@@ -37,12 +37,12 @@ def wave(
     `stem` is what the paths of its numbers begin with; `apart` are recordings that have a phase each, if they have: the
     wave then has one size, and is counted from a crest in each.
     """
-    periods = [one.period for one in waves]
-    numbers: dict[str, Any] = {"cosine": either_way(size), "sine": either_way(size)}
+    periods, parts = [one.period for one in waves], ("cosine",) if apart else ("cosine", "sine")
+    numbers: dict[str, Any] = dict.fromkeys(parts, either_way(size))
     numbers["period"] = Free(periods[0], 0.5 * min(periods), 2.0 * max(periods))
     if apart:
         numbers |= {"sine": 0.0, "origin": _of_each(periods[0])}
-    names = [f"{stem}{part}" for part in ("cosine", "sine") if isinstance(numbers[part], Free)]
+    names = [f"{stem}{part}" for part in parts]
     fixed = [
         {f"{stem}period": one.period, **{f"{stem}origin@{name}": one.crests.get(name, 0.0) for name in apart}}
         for one in waves
@@ -72,11 +72,11 @@ SAME_PERIOD = 0.1
 
 
 def set_apart(
-    part: Any, path: str, clues: Clues, apart: Sequence[str]
+    part: Any, path: str, clues: Clues, period: float, apart: Sequence[str]
 ) -> tuple[Any, dict[str, float], tuple[Trial, ...]]:
     """Return a wave that has a phase in each recording, the values of the one that it had, and a trial."""
     now = _found(part, path, clues)
-    size, period = math.hypot(*now.values()) or FURTHER, clues.numbers.get(f"{path}.period", start_of(part.period))
+    size = math.hypot(*now.values()) or FURTHER
     crest = math.atan2(now["sine"], now["cosine"]) * period / (2.0 * math.pi)
     origins = {f"{path}.origin@{name}": crest for name in apart}
     trial = Trial(tuple({name: value + STEP * period} for name, value in origins.items()))
@@ -146,7 +146,7 @@ class AbstractWaveEffect(AbstractEffect):
         apart = clues.apart(found)
         plain = not (has_own(part) or part.has_overtones or part.has_other)
         if plain and apart and abs(found[0].period / period - 1.0) < SAME_PERIOD:
-            part, off, trials = set_apart(part, path, clues, apart)
+            part, off, trials = set_apart(part, path, clues, period, apart)
             return Augmentation(self.with_wave(drive, place, part), off, trials)
         off, trials = dict[str, float](), tuple[Trial, ...]()
         if not part.has_overtones:
