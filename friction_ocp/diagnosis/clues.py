@@ -221,7 +221,8 @@ def _typical_torques(
         found[motor.shaft] = max(_rms([values]), 1e-12)
     for k, channel in enumerate(drive.outputs):
         if channel.signal == DRIVE_TORQUE:
-            columns = [item.measured[:, k] for item in fitted.model.train]
+            gain = abs(numbers.get(f"{channel.name}.gain", 1.0)) or 1.0
+            columns = [item.measured[:, k] / gain for item in fitted.model.train]
             found.setdefault(channel.part, max(_rms([values[np.isfinite(values)] for values in columns]), 1e-12))
     for _ in drive.transmissions:
         for item in drive.transmissions:

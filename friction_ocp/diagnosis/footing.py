@@ -30,6 +30,7 @@ from friction_ocp.estimation.torque_noise import (
     driving,
     input_power,
     seen_variance,
+    shown_speed,
     speed_ratio,
 )
 from friction_ocp.simulation.grid import FloatArray, IntArray
@@ -291,7 +292,7 @@ def still_gaps(model: Model, foot: Footing, recording: str, span: float, slopes:
         group = mech.topology.group_of.get(channel.part)
         if group is None or channel.signal not in ("theta", "omega"):
             continue
-        ratio = abs(speed_ratio(mech, foot.numbers[recording], channel.part))
+        ratio = abs(shown_speed(mech, foot.numbers[recording], channel))
         floor = NEGLIGIBLE_GAP * float(model.noise[k]) / max(ratio, 1e-300)
         names = {f"{mech.topology.roots[group]}.theta": floor, f"{mech.topology.roots[group]}.omega": floor / span}
         for state, limit in names.items():

@@ -26,16 +26,20 @@ def _known(value: object) -> bool:
 
 def _size(item: Channel, clues: Clues) -> float:
     """Return the typical size of what a channel records."""
+    return max(_true_size(item, clues) * abs(clues.numbers.get(f"{item.name}.gain", 1.0)), 1e-12)
+
+
+def _true_size(item: Channel, clues: Clues) -> float:
     if item.signal in ("theta", "omega"):
         table = clues.angles(item.part) if item.signal == "theta" else clues.speeds(item.part)
-        return max(float(np.std(table)), 1e-12)
+        return float(np.std(table))
     if item.signal == DRIVE_TORQUE:
-        return max(clues.typical_torque[item.part], 1e-12)
+        return clues.typical_torque[item.part]
     torques = [track.torque[item.part] for track in clues.tracks if item.part in track.torque]
     if torques:
         constant = clues.numbers.get(f"{item.part}.torque_constant", 1.0)
         factor = 1.0 if item.signal == "torque" else 1.0 / max(abs(constant), 1e-300)
-        return max(float(np.std(np.concatenate(torques))) * factor, 1e-12)
+        return float(np.std(np.concatenate(torques))) * factor
     return 1.0
 
 

@@ -59,6 +59,11 @@ def speed_ratio(mech: Mechanism, numbers: Mapping[str, float], shaft: str) -> fl
     return float(function(*(numbers.get(name, 1.0) for name in mech.parameters)))
 
 
+def shown_speed(mech: Mechanism, numbers: Mapping[str, float], channel: Channel) -> float:
+    """Return what a channel of an angle or a speed shows of the speed, over that of its group's first shaft."""
+    return speed_ratio(mech, numbers, channel.part) * numbers.get(f"{channel.name}.gain", 1.0)
+
+
 def input_power(
     drive: Drive, numbers: Mapping[str, float], noise: Callable[[Channel], tuple[float, float]]
 ) -> dict[str, float]:
@@ -74,14 +79,17 @@ def input_power(
 
 
 def seen_variance(mech: Mechanism, numbers: Mapping[str, float], covariances: FloatArray) -> FloatArray:
-    """Return (outputs,) the mean variance that states of covariances (k, states, states) have in angles and speeds."""
+    """Return (outputs,) the mean variance that states of covariances (k, states, states) have in what is recorded.
+
+    In channels of angles and speeds.
+    """
     mean = dict(zip(mech.state_names, np.mean(np.einsum("sii->si", covariances), axis=0), strict=True))
     added = np.zeros(len(mech.drive.outputs))
     for k, channel in enumerate(mech.drive.outputs):
         group = mech.topology.group_of.get(channel.part)
         name = "" if group is None else f"{mech.topology.roots[group]}.{channel.signal}"
         if name in mean:
-            added[k] = speed_ratio(mech, numbers, channel.part) ** 2 * float(mean[name])
+            added[k] = shown_speed(mech, numbers, channel) ** 2 * float(mean[name])
     return added
 
 

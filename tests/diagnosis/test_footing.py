@@ -10,11 +10,19 @@ import h5py
 import numpy as np
 import pytest
 import yaml
-from diagnosis_cases import COULOMB, INERTIA, VISCOUS, axis, write_case
+from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.footing import NUMERICAL_INPUT, footing, input_noise, pieces, still_gaps, torque_noise
+from friction_ocp.diagnosis.footing import (
+    NUMERICAL_INPUT,
+    Footing,
+    footing,
+    input_noise,
+    pieces,
+    still_gaps,
+    torque_noise,
+)
 from friction_ocp.diagnosis.gathered_noise import slopes_about, unit_covariances
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.gap import start_weight
@@ -80,6 +88,30 @@ def test_noise_of_a_channel_with_a_gain_is_that_of_the_motor_over_it(bristled: M
     plain, shown = (torque_noise(bristled, known | gain)["motor"] for gain in ({}, {"current.gain": 0.5}))
     assert shown == pytest.approx(2.0 * plain)
     assert shown == pytest.approx(torque_noise(bristled, {"motor.torque_constant": 0.6})["motor"])
+
+
+def test_an_angle_may_be_shown_of_the_other_side_of_a_gear(tmp_path: Path) -> None:
+    """A motor's encoder whose log is of the output: the same noise, as long segments, and no other power of a fit."""
+    found = list[tuple[Model, Footing, float]]()
+    for name, gain in (("motor", 1.0), ("output", -0.01)):
+        (tmp_path / name).mkdir()
+        path = write_case(tmp_path / name, axis())
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document["channels"]["position"] |= {"gain": gain, "resolution": ENCODER_STEP * abs(gain)}
+        path.write_text(yaml.safe_dump(document), encoding="utf-8")
+        for each in "abc":
+            with h5py.File(tmp_path / name / f"{each}.h5", "r+") as file:
+                angle: Any = file["channels/position"]
+                angle[...] = gain * angle[:]
+        model = prepare(load_problem(path))
+        fitted = fit_base(model)
+        found.append((model, fitted.footing, innovations(fitted).ratio))
+    (first, plain, power), (second, shown, other) = found
+    assert shown.noise == pytest.approx(0.01 * plain.noise)
+    assert shown.segment_s == plain.segment_s and other == pytest.approx(power, rel=1e-3)
+    slopes = np.zeros((len(first.drive.state_names),) * 2)
+    gaps = [still_gaps(model, foot, "a", 0.02, slopes) for model, foot in ((first, plain), (second, shown))]
+    assert gaps[1] == pytest.approx(gaps[0])
 
 
 def test_noise_of_a_current_within_long_segments_is_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
