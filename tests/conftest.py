@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 
@@ -10,6 +11,9 @@ from hypothesis import settings
 
 settings.register_profile("steady", deadline=None, derandomize=True)
 settings.load_profile("steady")
+
+os.environ.setdefault("FRICTION_OCP_CFLAGS", "-O1")
+"""Short runs wait for the compiler more than for what it makes faster."""
 
 
 @pytest.fixture(scope="module")

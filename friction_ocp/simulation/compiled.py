@@ -108,6 +108,11 @@ def vector_flags() -> tuple[str, ...]:
     return ("-DLANES=4", "-mavx2") if " avx2 " in flags else ("-DLANES=2",)
 
 
+def stated_flags() -> tuple[str, ...]:
+    """Return what FRICTION_OCP_CFLAGS adds, such as -O1: compiled sooner, simulated slower, the same numbers."""
+    return tuple(os.environ.get("FRICTION_OCP_CFLAGS", "").split())
+
+
 def cache_folder() -> Path:
     """Return the folder of compiled code, below XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("XDG_CACHE_HOME")
@@ -122,7 +127,7 @@ def compile_sweep(drive: SteppedDrive, active: Sequence[int], values_only: bool 
     program = compiler()
     if program is None:
         return None
-    flags = (*(QUICK_FLAGS if values_only else FLAGS), *vector_flags())
+    flags = (*(QUICK_FLAGS if values_only else FLAGS), *vector_flags(), *stated_flags())
     try:
         return CompiledKernel(_library(generated_source(drive, active, values_only), program, cache_folder(), flags))
     except (OSError, RuntimeError, subprocess.SubprocessError):

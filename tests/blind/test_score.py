@@ -249,6 +249,7 @@ def test_correlation_finds_what_is_plain(effect: str | None, tmp_path: Path) -> 
     assert (found and found[0]) == effect
 
 
+@pytest.mark.slow
 def test_the_lowest_left_out_error_finds_what_is_plain(tmp_path: Path) -> None:
     """The second baseline names unbalance of a servo's motor among three effects."""
     case = Case(5, 1, "one", "servo", (Planted("unbalance", "motor", 0.3, 7, 20.0),))

@@ -15,7 +15,8 @@ from friction_ocp.problem_file.load import load_problem
 LAG, DEAD = 3.0 * STEP, 2.5 * STEP
 
 
-@pytest.mark.parametrize(("shown", "hidden"), [("command", 1.0), pytest.param("current", 0.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("shown", "hidden"), [("command", 1.0), ("current", 0.0)])
 def test_the_lag_is_found_whichever_is_logged(tmp_path: Path, shown: str, hidden: float) -> None:
     """The motor is named, not its sensors, and its time constant is that of the plant."""
     path = written(tmp_path, feedback="quiet", lag=LAG, shown=shown, effects=("drive_lag", "sensor_delay", "stribeck"))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 import yaml
 from diagnosis_cases import axis, diagnosed, write_case
 
 
+@pytest.mark.slow
 def test_what_is_the_same_at_two_places_lies_at_both(tmp_path: Path) -> None:
     """Friction that falls with speed on one of two shafts that turn as one: accepted at one, possible at the other."""
     path = write_case(tmp_path, axis(law="stribeck", tau_s=0.16, omega_s=3.0), effects=["stribeck"])

@@ -122,7 +122,8 @@ def test_bristles_are_found_with_their_damping(tmp_path: Path) -> None:
     assert found.final.values["motor.friction.bristle.sigma1"] == pytest.approx(damping, rel=0.1)
 
 
-@pytest.mark.parametrize("first", ["constant_torque", pytest.param("unbalance", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("first", ["constant_torque", "unbalance"])
 def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: Path) -> None:
     """Dry friction that differs by direction remains what a constant torque may be; gravity goes, accepted or not."""
     plant = axis(tau_c=(1.1 * COULOMB, 0.9 * COULOMB))
