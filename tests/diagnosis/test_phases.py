@@ -14,6 +14,7 @@ from plant import Plant, PlantRipple
 
 from friction_ocp.diagnosis.locate import shape
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.effects.periods import Seen, likeliest
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.own_numbers import fitted_again
@@ -59,6 +60,17 @@ def test_waves_of_another_size_in_every_recording_are_none_with_phases_of_their_
     """Something else is missing that looks like them."""
     known = Clues(tracks((0.4, 2.0, 4.0), (0.02, 0.03, 0.3)), {}, {"motor": 1.0})
     assert known.apart(known.waves("motor", "theta")) == ()
+
+
+@pytest.mark.parametrize(("turns", "apart"), [((4.4, 4.4, 4.4), True), ((4.4, 1.5, 1.5), False)])
+def test_two_recordings_at_least_tell_of_phases(turns: tuple[float, ...], apart: bool) -> None:
+    """What is missing looks like a wave of any phase where that is hardly longer than the way it is seen along."""
+    rng, seen = np.random.default_rng(3), list[Seen]()
+    for k, (turn, phase) in enumerate(zip(turns, (0.4, 2.0, 4.0), strict=True)):
+        place = np.linspace(0.0, turn, 400)
+        torque = np.cos(2.0 * np.pi * place + phase) + 0.1 * rng.standard_normal(place.size)
+        seen.append(Seen(place, torque, torque, np.ones(place.size), f"run-{k}"))
+    assert likeliest(seen, 0.5)[0].apart == apart
 
 
 def written(folder: Path, plants: tuple[Plant, ...], effects: tuple[str, ...]) -> Path:
