@@ -35,7 +35,8 @@ def test_a_hostile_file_is_refused(
     folder = tmp_path / "inside" / "work"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(probe, "SECONDS", 2)
+    if "has no end" in message:  # what ends may take as long as it is given, on a slow machine
+        monkeypatch.setattr(probe, "SECONDS", 2)
     arguments = make(folder)
     before, began = sorted(tmp_path.rglob("*")), sum(os.times()[:4])
     status = main(arguments)
