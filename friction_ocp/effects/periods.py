@@ -130,15 +130,17 @@ def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[flo
 def _of_one_size(each: Sequence[Seen], frequency: float) -> bool:
     """Whether the waves of a frequency, with a phase in each recording, are likely to be of one size.
 
-    Two recordings at least have to tell. A wave that is hardly longer than the way it is seen along takes the shape of
-    almost anything with phases of its own.
+    Two recordings at least have to tell. A wave that is hardly shorter than the way along which it is seen takes the
+    shape of almost anything with phases of its own.
     """
     passed = [one for one in each if np.ptp(one.place) * frequency >= TWICE]
+    if len(passed) < 2:
+        return False
     at = np.array([frequency])
     power = np.array([float(spectrum(one.place - one.place[0], one.beyond, one.factor, at)[0]) for one in passed])
     weight = np.array([0.5 * float(np.sum(one.factor**2)) for one in passed])
     alike = float(np.sum(np.sqrt(power * weight))) ** 2 / max(float(np.sum(weight)), 1e-300)
-    return len(passed) > 1 and alike >= ALIKE * float(np.sum(power))
+    return alike >= ALIKE * float(np.sum(power))
 
 
 def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[float, float]:

@@ -30,6 +30,7 @@ def _size(item: Channel, clues: Clues) -> float:
 
 
 def _true_size(item: Channel, clues: Clues) -> float:
+    """Return the typical size of what a channel shows, on the machine."""
     if item.signal in ("theta", "omega"):
         table = clues.angles(item.part) if item.signal == "theta" else clues.speeds(item.part)
         return float(np.std(table))

@@ -79,10 +79,7 @@ def input_power(
 
 
 def seen_variance(mech: Mechanism, numbers: Mapping[str, float], covariances: FloatArray) -> FloatArray:
-    """Return (outputs,) the mean variance that states of covariances (k, states, states) have in what is recorded.
-
-    In channels of angles and speeds.
-    """
+    """Return (outputs,) the mean variance that covariances (k, states, states) make of recorded angles and speeds."""
     mean = dict(zip(mech.state_names, np.mean(np.einsum("sii->si", covariances), axis=0), strict=True))
     added = np.zeros(len(mech.drive.outputs))
     for k, channel in enumerate(mech.drive.outputs):

@@ -64,7 +64,7 @@ def test_waves_of_another_size_in_every_recording_are_none_with_phases_of_their_
 
 @pytest.mark.parametrize(("turns", "apart"), [((4.4, 4.4, 4.4), True), ((4.4, 1.5, 1.5), False)])
 def test_two_recordings_at_least_tell_of_phases(turns: tuple[float, ...], apart: bool) -> None:
-    """What is missing looks like a wave of any phase where that is hardly longer than the way it is seen along."""
+    """What is missing looks like a wave of any phase where that is hardly shorter than the way."""
     rng, seen = np.random.default_rng(3), list[Seen]()
     for k, (turn, phase) in enumerate(zip(turns, (0.4, 2.0, 4.0), strict=True)):
         place = np.linspace(0.0, turn, 400)
