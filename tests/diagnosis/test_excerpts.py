@@ -109,6 +109,7 @@ def long_log(plant: Plant, seconds: float) -> Recording:
     return Recording("a", {key: Channel(key, *run.channels[key], unit) for key, unit in units.items()})
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_a_long_log_goes_by_parts_of_it(tmp_path: Path) -> None:
     """What is missing is found from a part, the result says from which, and the gap is that of whole recordings."""
     plant = axis(**STRIBECK)

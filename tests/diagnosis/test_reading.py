@@ -98,6 +98,7 @@ def test_a_held_goal_is_told_beside_what_nothing_explains(tmp_path: Path) -> Non
     assert any(text.startswith("goal: is held") for text in diagnosis_document(seen)["assumptions"])
 
 
+@pytest.mark.slow
 def test_what_was_fitted_beside_the_refits_is_what_is_fitted_when_asked_for(tmp_path: Path) -> None:
     """The base model of another reading is the same, be it the work of a task before or of whoever asks."""
     path = write_case(tmp_path, axis(law="stribeck", tau_s=0.15, omega_s=6.0))

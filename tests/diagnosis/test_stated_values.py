@@ -85,6 +85,7 @@ def test_a_fixed_value_is_named_before_the_fitted_ones_that_gave_way_to_it(tmp_p
     assert tried == {("parameter_error", "motor"), ("inertia_error", "motor")}
 
 
+@pytest.mark.slow
 def test_an_inertia_may_be_stated_with_what_hangs_on_it(tmp_path: Path) -> None:
     """A fifth of the stated inertia hangs on a spring; the rest is no contradiction."""
     plant, moved, rate = axis(), 0.2 * INERTIA, 2.0 * np.pi * 15.0

@@ -51,6 +51,7 @@ def write_decays(folder: Path) -> Path:
     return written(folder, document)
 
 
+@pytest.mark.slow
 def test_an_encoder_that_is_zeroed_elsewhere_is_found_by_letting_go(tmp_path: Path) -> None:
     """Its offset is told from a constant torque, and from the weight that is stated."""
     result = diagnosed(write_decays(tmp_path))
@@ -89,6 +90,7 @@ def write_bench(folder: Path, friction: PlantFriction, told: str, effects: list[
     return written(folder, document)
 
 
+@pytest.mark.slow
 def test_what_to_record_next_asks_for_no_command(tmp_path: Path) -> None:
     """Friction that differs by direction and a torque sensor that is off are the same; no motor tells them apart."""
     friction = PlantFriction("coulomb_viscous", tau_c=(0.06, 0.04), viscous=2e-3)

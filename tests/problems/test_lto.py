@@ -113,6 +113,7 @@ def test_the_ranges_of_equation_10_do_not_move_an_estimate_inside_them() -> None
         assert held.values[name] == pytest.approx(value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_ranges_of_equation_11_do_not_move_an_estimate_inside_them() -> None:
     """With the break in the slow part: slopes of the slow part of either sign, c0h and R c0l within c0."""
     estimate = fitted("low_speed_ranges")

@@ -58,6 +58,7 @@ def test_misfit_scales_the_likelihood_as_it_does_the_standard_error() -> None:
         assert abs(np.log(item.scale)) > 0.2
 
 
+@pytest.mark.slow
 def test_a_parameter_at_its_bound_is_one_sided() -> None:
     """Viscous friction that may not be as small as it is lies on its bound and is excluded above only.
 
