@@ -236,6 +236,8 @@ class Bench:
     stepped: SteppedDrive = field(init=False)
     numbers: np.ndarray = field(init=False)
     """Values of the parameters in the order of the stepped drive."""
+    _accumulated: dict[int, Any] = field(init=False, default_factory=dict[int, Any])
+    """Steps put together by their number: a controller has as many from each of its ticks to the next."""
 
     def __post_init__(self) -> None:
         made = stepped(self.drive)
@@ -281,10 +283,15 @@ class Bench:
             states[:, first] = np.asarray(x).ravel()
             if last > first:
                 count, inputs, h = _substeps(grid, first, last)
-                passed = self.stepped.step.mapaccum(h.size)(x, inputs, self.numbers, h, widths)
+                passed = self._steps(h.size)(x, inputs, self.numbers, h, widths)
                 states[:, first + 1 : last + 1] = np.asarray(passed)[:, np.cumsum(count) - 1]
                 x = passed[:, -1]
         return states
+
+    def _steps(self, number: int) -> Any:
+        if number not in self._accumulated:
+            self._accumulated[number] = self.stepped.step.mapaccum(number)
+        return self._accumulated[number]
 
 
 def _substeps(grid: Grid, first: int, last: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
