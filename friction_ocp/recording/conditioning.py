@@ -86,20 +86,26 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
     lengths, outside = stops - starts, ~at_extreme[starts]
     long = ~outside & (lengths > max(2.0, 2.0 * float(np.quantile(lengths[outside], 0.9))))
     level = detect_resolution(y) or 0.0
-    coarse = 4.0 * level
+    coarse, noise = 4.0 * level, high_frequency_noise(np.arange(len(y)), y)
     usual = {
         reach: float(np.median(np.abs(y[reach:] - y[:-reach])[~(at_extreme[reach:] & at_extreme[:-reach])]))
         for reach in range(2, 6)
     }
     stuck, ways = 0, np.zeros(2, dtype=bool)
     for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
-        reach = min(max((stop - start) // 2, 2), 5)
+        longest = min(max((stop - start) // 2, 2), 5)
         # A parabola reached and left with slope s is s n / 4 high over n samples; a quantised one stays within levels.
         height = float(np.nanmean(_moves(y, start, stop, 2))) / 2.0 * (stop - start) / 4.0
-        near, far = _moves(y, start, stop, reach), _moves(y, start, stop, 2 * reach)
-        # Twice as long after a rest a signal is four times as far from it; from where it was cut off, less: a parabola.
-        most = 2.0 * (stop - start + 2 * reach) / (stop - start + reach)
-        fast = (near > max(0.25 * usual[reach], coarse)) & ~(far > np.sqrt(4.0 * most) * (near - level))
+        fast, slow = np.zeros(2, dtype=bool), np.zeros(2, dtype=bool)
+        for reach in range(2, longest + 1):
+            near, far = _moves(y, start, stop, reach), _moves(y, start, stop, 2 * reach)
+            # Twice as long after a rest a signal is four times as far from it; from where it was cut off, less: a
+            # parabola.
+            most = 2.0 * (stop - start + 2 * reach) / (stop - start + reach)
+            rest = far > np.sqrt(4.0 * most) * (near - level)
+            slow |= (near > max(coarse, 4.0 * noise)) & rest
+            fast = (near > max(0.25 * usual[reach], coarse)) & ~rest
+        fast &= ~slow
         if np.any(fast) and height > coarse:
             stuck += stop - start
             ways |= fast | np.array([start == 0, stop == len(y)])
@@ -209,7 +215,7 @@ def _runs(y: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
 def plateaus(values: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Return start and stop of every run of three or more samples at the highest or lowest value."""
     starts, stops = _runs(values)
-    there = ((values == np.max(values)) | (values == np.min(values)))[starts] & (stops - starts > 2)
+    there = ((values == np.nanmax(values)) | (values == np.nanmin(values)))[starts] & (stops - starts > 2)
     return starts[there], stops[there]
 
 

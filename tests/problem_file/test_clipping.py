@@ -67,3 +67,49 @@ def test_a_command_may_stay_at_the_stated_limits_of_its_controller(
     workshop.recording(spoil=record)
     findings = check(load_problem(workshop.problem(close)))
     assert [item.severity for item in findings if "is clipped" in item.what] == found
+
+
+def goes(time: FloatArray, abruptly: bool, on: float = 1.0) -> FloatArray:
+    """Return an angle that goes to and fro, at one speed or as a sine, and is cut off at both ends: `on` as far out."""
+    if abruptly:
+        return np.clip(np.abs((0.5 * time) % 2.0 - 1.0) - 0.5, -0.3 * on, 0.3 * on)
+    return np.clip(0.6 * np.sin(np.pi * time), -0.5 * on, 0.5 * on)
+
+
+def found(workshop: Workshop, signals: dict[str, FloatArray], speed_is_recorded: bool) -> list[str]:
+    """Return the severities of what is found to be clipped."""
+
+    def record(file: Any) -> None:
+        for name, values in signals.items():
+            file.pop(f"channels/{name}", None)
+            file[f"/channels/{name}"] = values
+            file[f"/channels/{name}"].attrs["unit"] = {"current": "A", "position": "rad"}.get(name, "rad/s")
+
+    def see(content: dict[str, Any]) -> None:
+        if speed_is_recorded:
+            content["channels"]["speed"] = {"measures": "load.omega", "noise_std": 1e-3}
+
+    workshop.recording(spoil=record)
+    findings = check(load_problem(workshop.problem(see)))
+    return [item.severity for item in findings if "is clipped" in item.what and "position" in item.what]
+
+
+@pytest.mark.parametrize(("abruptly", "severity"), [(True, "warning"), (False, "error")])
+def test_a_motion_that_comes_straight_to_its_extremes_may_rest_there(
+    workshop: Workshop, abruptly: bool, severity: str
+) -> None:
+    """What was turning and is cut off is wrong; what stops at one speed within a sample may be a machine at rest."""
+    time = np.arange(0.0, 6.0, 0.002)
+    signals = {"current": 0.2 * np.sin(time), "position": goes(time, abruptly)}
+    assert found(workshop, signals, speed_is_recorded=False) == [severity]
+
+
+@pytest.mark.parametrize("rests", [True, False])
+@pytest.mark.parametrize("abruptly", [True, False])
+def test_another_channel_shows_whether_a_motion_rests(workshop: Workshop, abruptly: bool, rests: bool) -> None:
+    """An angle is not cut off where the recorded speed is zero, and is where it goes on."""
+    time, rng = np.arange(0.0, 6.0, 0.002), np.random.default_rng(3)
+    angle = goes(time, abruptly)
+    speed = np.gradient(goes(time, abruptly, on=1.0 if rests else 2.0), time) + 1e-3 * rng.standard_normal(time.size)
+    signals = {"current": 0.2 * np.sin(time), "position": angle, "speed": speed}
+    assert bool(found(workshop, signals, speed_is_recorded=True)) == (not rests)

@@ -160,6 +160,26 @@ def test_ramp_into_a_rest_that_a_fall_ends_is_not_clipped() -> None:
     assert not is_clipped(np.round(seen * 650.0) / 650.0)
 
 
+def moves(step: float, speed: float, acceleration: float) -> np.ndarray:
+    """Return a servo that goes to and fro by 1 rad, at rest between, as the means of 20 instants in every sample."""
+    reached = speed / acceleration
+    time = np.arange(0.0, 1.0 / speed + reached, step / 20.0)
+    rate = speed * np.clip(np.minimum(time, time[-1] - time) / reached, 0.0, 1.0)
+    stroke = np.cumsum(rate) * step / 20.0
+    rests = [np.full(count, place) for count, place in ((1130, 0.0), (1570, stroke[-1]), (930, 0.0))]
+    fine = np.concatenate([rests[0], stroke, rests[1], stroke[-1] - stroke, rests[2], stroke, rests[1]])
+    return fine[10::20]
+
+
+@pytest.mark.parametrize("reached", [3.2, 6.0, 20.0])
+@pytest.mark.parametrize("step", [0.001, 0.008, 0.02])
+@pytest.mark.parametrize("resolution", [0.0, 1e-6, 1e-5])
+def test_moves_from_place_to_place_are_not_clipped(step: float, reached: float, resolution: float) -> None:
+    """A servo that rests where its moves end is not cut off, be it at full speed after a few samples."""
+    seen = moves(step, 0.1, 0.1 / (reached * step))
+    assert not is_clipped(np.round(seen / resolution) * resolution if resolution else seen)
+
+
 def test_smooth_motion_of_a_line_is_exact(rng: np.random.Generator) -> None:
     """A line is its own smoothing spline at any cutoff: exact speed, no acceleration."""
     time = times(rng)

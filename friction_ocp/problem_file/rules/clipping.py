@@ -10,6 +10,7 @@ from friction_ocp.drive.parts import Channel
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, quantity_text
+from friction_ocp.problem_file.rules.resting import MOTIONS, comes_straight, is_shown_to_rest
 from friction_ocp.recording.conditioning import high_frequency_noise, is_clipped, plateaus
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
@@ -30,25 +31,29 @@ _FEW, _MANY = 8, 50
 def channels_are_not_clipped(case: Case) -> Iterator[Finding]:
     """A measurement does not run into the end of its range.
 
-    Set points are left out, and what stays at the stated limits of the controller that commands it. An effort at its
-    limits is true where the amplifier is at its limit, which the motion tells; an input of nothing but ramps and
-    plateaus may be a command, which is only doubtful.
+    Set points are left out, what stays at the stated limits of the controller that commands it, and what rests as
+    another channel of the same motion does. An effort at its limits is true where the amplifier is at its limit, which
+    the motion tells; an input of nothing but ramps and plateaus may be a command, and a motion that comes straight to
+    its extremes may rest there, which is only doubtful.
     """
     for place, use in case.uses():
         for channel in case.drive.channels:
             recorded = use.recording.channels.get(channel.name)
             if recorded is None or _is_command(channel) or not is_clipped(recorded.values):
                 continue
-            if _limited(case, channel, recorded):
+            if _limited(case, channel, recorded) or is_shown_to_rest(case, channel, use):
                 continue
             low, high = float(np.nanmin(recorded.values)), float(np.nanmax(recorded.values))
             limits = f"{quantity_text(low, recorded.unit)} or {quantity_text(high, recorded.unit)}"
-            doubtful = channel.role == "input" and (_is_straight(recorded) or _may_be_true(case, channel, use))
-            true = "; it may be left as it is if the amplifier was at its limit" if doubtful else ""
+            rests = channel.signal in MOTIONS and comes_straight(recorded)
+            limited = channel.role == "input" and (_is_straight(recorded) or _may_be_true(case, channel, use))
+            doubtful = rests or limited
+            meant = "the machine rested there" if channel.signal == "theta" else "the speed was constant there"
+            true = f"; it may be left as it is if {meant if rests else 'the amplifier was at its limit'}"
             yield Finding(
                 case.at_recording(place, use),
                 f"channel '{channel.name}' is clipped: it stays at its extremes of {limits}",
-                remedy=f"record it with a wider range, or cut that part out{true}",
+                remedy=f"record it with a wider range, or cut that part out{true if doubtful else ''}",
                 severity="warning" if doubtful else "error",
             )
 
