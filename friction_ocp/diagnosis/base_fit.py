@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.easing import along, eased, finer
 from friction_ocp.diagnosis.excerpts import excerpts
-from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.fitted_model import AT_ODDS, FittedModel
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
@@ -60,15 +60,35 @@ def _fitted_base(model: Model) -> FittedModel:
             loss = Absolute(BLUNT * mean_error(fitted.program, fitted.solution.point))
         return polished(model, footing(model, theta, loss), theta, None)
     program, end = _rough_answer(model)
-    foot = footing(model, end.theta)
+    foot = _laid(model, end.theta)
     exact = foot.program(model, program.experiments)
     nodes = exact.point_along(program, end).nodes
     fitted = _joined(model, foot, end.theta, nodes if len(foot.train) == len(program.experiments) else None)
     for _ in range(MOST_RELAID):
-        if noise_moved(fitted.linear.program, model, fitted.footing, fitted.theta) < RELAID:
+        if noise_moved(fitted.linear.program, model, fitted.footing, _plausible(model, fitted.theta)) < RELAID:
             break
-        fitted = _joined(model, footing(model, fitted.theta), fitted.theta, None)
+        fitted = _joined(model, _laid(model, fitted.theta), fitted.theta, None)
     return fitted
+
+
+def _laid(model: Model, theta: FloatArray) -> Footing:
+    """Lay a footing at parameters, as far as their priors let them be there.
+
+    A stated rotor that is fitted far too light stands in for what the model lacks: gaps laid for it would let torque
+    noise explain all of that, and lead to a rotor that is lighter still.
+    """
+    return footing(model, _plausible(model, theta))
+
+
+def _plausible(model: Model, theta: FloatArray) -> FloatArray:
+    """Return parameters with those at odds with their priors put where these end, as many times too small as large."""
+    space = model.space
+    with np.errstate(invalid="ignore", divide="ignore"):
+        most = 1.0 + AT_ODDS * space.prior_std / np.abs(space.prior_mean)
+        ends = space.prior_mean / most, space.prior_mean * most
+    known = np.isfinite(space.prior_std) & (space.prior_mean != 0.0)
+    low, high = np.where(known, np.minimum(*ends), -np.inf), np.where(known, np.maximum(*ends), np.inf)
+    return space.clip(np.clip(theta, low, high))
 
 
 def _joined(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:

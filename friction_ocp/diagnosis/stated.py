@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import Considered
 from friction_ocp.diagnosis.polishing import polished
 from friction_ocp.diagnosis.refit import completed, quick_refit
-from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.rival import Rival, is_another
 from friction_ocp.diagnosis.screen import Screened, screen
 from friction_ocp.diagnosis.select import Choice, needed, schwarz
 from friction_ocp.diagnosis.stated_keys import stated_key
@@ -158,7 +158,7 @@ def _freed(
         near = quick_refit(current, seen)
         far = polished(near.model, near.footing, near.model.space.with_known(near.values | wanted), None)
         fitted = completed(min((near, far), key=lambda fit: fit.objective if fit.holds else np.inf))
-        if fitted.holds:
+        if fitted.holds and not is_another(seen, fitted):
             yield fitted.theta.size - current.theta.size, seen, fitted
 
 

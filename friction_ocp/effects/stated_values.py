@@ -17,12 +17,18 @@ _NUMBERS = {
 }
 
 
+LIKELY, LIKELY_RATIO = 10.0, 1.2
+"""Factors by which a stated number may be wrong. Teeth are counted and rollers measured: a larger error of a ratio is
+another gear, which every simulation shows at once, and bends the angle of the other side as no torque would."""
+
+
 def freed(drive: Drive, paths: Iterable[str]) -> Drive:
     """Return the drive with fixed numbers made free, their values the guesses."""
     values = {leaf.path: leaf.value for leaf in drive_leaves(drive)}
     for path in paths:
         guess = float(values[path])
-        low, high = sorted((0.1 * guess, 10.0 * guess))
+        most = LIKELY_RATIO if _is_ratio(path) else LIKELY
+        low, high = sorted((guess / most, guess * most))
         values[path] = Free(guess, low, high)
     return bind_drive(drive, values)
 
@@ -68,7 +74,11 @@ class ParameterErrorEffect(AbstractEffect):
         whole = [_trial(drive, [path]) for path in _numbers(_fixed(drive), place, keys)]
         off = {path: value for item in whole for path, value in item.off.items()}
         trials = tuple(trial for item in whole for trial in item.trials)
-        return Augmentation(freed(drive, off), off, trials)
+        return Augmentation(freed(drive, off), off, trials, inside=tuple(filter(_is_ratio, off)))
+
+
+def _is_ratio(path: str) -> bool:
+    return path.endswith(".ratio")
 
 
 def _parts(drive: Drive) -> dict[str, tuple[str, ...]]:

@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.free_gap import FreeErrors
 from friction_ocp.diagnosis.rival import is_another
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.diagnosis.worth import Standard, with_resembling
-from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft
+from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.effects.effect import Augmentation, Clues, Trial
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.score import FreeRun
@@ -48,12 +48,20 @@ def test_far_from_the_recordings_an_effect_is_tried_at_all_its_places() -> None:
 
 @pytest.mark.parametrize(
     ("effect", "place", "path"),
-    [("sensor_gain", "torque", "torque.gain"), ("sensor_eccentricity", "theta", "theta.eccentricity.sine")],
+    [
+        ("sensor_gain", "torque", "torque.gain"),
+        ("sensor_eccentricity", "theta", "theta.eccentricity.sine"),
+        ("parameter_error", "motor-load", "motor-load.ratio"),
+    ],
 )
 def test_what_is_as_large_as_it_may_be_is_another_effect(effect: str, place: str, path: str) -> None:
-    """An angle that is half a radian off is not that of an eccentric disc, nor half as much again a wrong scale."""
+    """An angle that is half a radian off is not that of an eccentric disc, nor half as much again a wrong scale.
+
+    A ratio that is a fifth off is of another gear.
+    """
     channels = (Channel("torque", "drive.torque", "input"), Channel("theta", "motor.theta"))
-    drive = Drive((Shaft("motor", 0.02),), (), (Motor("drive", "motor"),), None, channels)
+    shafts, gear = (Shaft("motor", 0.02), Shaft("load", 0.5)), Transmission("motor", "load", 20.0, 900.0)
+    drive = Drive(shafts, (gear,), (Motor("drive", "motor"),), None, channels)
     added = effects()[effect].augment(drive, place, Clues((), {}, {"motor": 0.1}))
     candidate = Screened(effect, place, 1.0, 0.0, (), added)
     for ended, another in ((path, True), ("motor.inertia", False)):
