@@ -74,7 +74,9 @@ class ParameterErrorEffect(AbstractEffect):
         whole = [_trial(drive, [path]) for path in _numbers(_fixed(drive), place, keys)]
         off = {path: value for item in whole for path, value in item.off.items()}
         trials = tuple(trial for item in whole for trial in item.trials)
-        return Augmentation(freed(drive, off), off, trials, inside=tuple(filter(_is_ratio, off)))
+        # Beside a stiffness a ratio may be anything where the other side is not seen: its bound then says nothing.
+        alone = tuple(off) if all(map(_is_ratio, off)) else ()
+        return Augmentation(freed(drive, off), off, trials, inside=alone)
 
 
 def _is_ratio(path: str) -> bool:

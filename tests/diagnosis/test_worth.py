@@ -60,7 +60,7 @@ def test_what_is_as_large_as_it_may_be_is_another_effect(effect: str, place: str
     A ratio that is a fifth off is of another gear.
     """
     channels = (Channel("torque", "drive.torque", "input"), Channel("theta", "motor.theta"))
-    shafts, gear = (Shaft("motor", 0.02), Shaft("load", 0.5)), Transmission("motor", "load", 20.0, 900.0)
+    shafts, gear = (Shaft("motor", 0.02), Shaft("load", 0.5)), Transmission("motor", "load", 20.0)
     drive = Drive(shafts, (gear,), (Motor("drive", "motor"),), None, channels)
     added = effects()[effect].augment(drive, place, Clues((), {}, {"motor": 0.1}))
     candidate = Screened(effect, place, 1.0, 0.0, (), added)
