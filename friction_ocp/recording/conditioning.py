@@ -72,8 +72,8 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
 
     Only runs of equal extremes count that are longer than runs elsewhere and are reached and left in full motion, four
     levels of a quantised signal within five samples: neither is the flat top of a quantised sine, nor a rest, which
-    friction may end with a jump or from which the signal starts slowly. But a commanded plateau looks the same as
-    clipping.
+    friction may end with a jump or from which the signal starts slowly, be it that two samples alone show this. But a
+    commanded plateau looks the same as clipping, and so does a rest that ends at full speed within a sample.
     """
     y = np.asarray(values, dtype=np.float64)
     y = y[np.isfinite(y)]
@@ -99,8 +99,7 @@ def is_clipped(values: npt.ArrayLike, min_share: float = 0.01) -> bool:
         fast, slow = np.zeros(2, dtype=bool), np.zeros(2, dtype=bool)
         for reach in range(2, longest + 1):
             near, far = _moves(y, start, stop, reach), _moves(y, start, stop, 2 * reach)
-            # Twice as long after a rest a signal is four times as far from it; from where it was cut off, less: a
-            # parabola.
+            # Twice as long after a rest a signal is four times as far from it; from where it was cut off, less.
             most = 2.0 * (stop - start + 2 * reach) / (stop - start + reach)
             rest = far > np.sqrt(4.0 * most) * (near - level)
             slow |= (near > max(coarse, 4.0 * noise)) & rest
