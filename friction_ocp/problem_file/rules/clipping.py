@@ -47,14 +47,14 @@ def channels_are_not_clipped(case: Case) -> Iterator[Finding]:
             limits = f"{quantity_text(low, recorded.unit)} or {quantity_text(high, recorded.unit)}"
             rests = channel.signal in MOTIONS and comes_straight(recorded)
             limited = channel.role == "input" and (_is_straight(recorded) or _may_be_true(case, channel, use))
-            doubtful = rests or limited
             meant = "the machine rested there" if channel.signal == "theta" else "the speed was constant there"
-            true = f"; it may be left as it is if {meant if rests else 'the amplifier was at its limit'}"
+            known = meant if rests else "the amplifier was at its limit" if limited else ""
+            left = f"; it may be left as it is if {known}" if known else ""
             yield Finding(
                 case.at_recording(place, use),
                 f"channel '{channel.name}' is clipped: it stays at its extremes of {limits}",
-                remedy=f"record it with a wider range, or cut that part out{true if doubtful else ''}",
-                severity="warning" if doubtful else "error",
+                remedy=f"record it with a wider range, or cut that part out{left}",
+                severity="warning" if known else "error",
             )
 
 

@@ -53,14 +53,13 @@ def comes_straight(recorded: RecordedChannel) -> bool:
     y, step = recorded.values, float(np.median(np.diff(recorded.time)))
     begin, end = _stays(y)
     beside = np.clip((end - begin + 1) // 8, 2, _REACH)
-    early, late = begin - _BESIDE - 2 * beside, end + _BESIDE + 2 * beside
     ways = list[float]()
     for k in range(begin.size):
         sign = 1.0 if y[begin[k]] == np.nanmax(y) else -1.0
         span = step * float(beside[k])
-        for at, far, way in ((begin[k] - _BESIDE, early[k], -1), (end[k] + _BESIDE, late[k], 1)):
-            if 0 <= far < y.size:
-                near, middle, last = sign * y[[at, at + way * beside[k], at + 2 * way * beside[k]]]
+        for at, reach in ((begin[k] - _BESIDE, -beside[k]), (end[k] + _BESIDE, beside[k])):
+            if 0 <= at + 2 * reach < y.size:
+                near, middle, last = sign * y[[at, at + reach, at + 2 * reach]]
                 slope, bent = (near - last) / (2.0 * span), -(near - 2.0 * middle + last) / span**2
                 turned = 2.0 * slope / (step * float(end[k] - begin[k]))
                 ways.append(bent / turned if turned > 0.0 else np.nan)
