@@ -22,7 +22,7 @@ from friction_ocp.diagnosis.options import AT, considered
 from friction_ocp.diagnosis.reading import corrections, with_additions
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import gave_shape, probabilities
-from friction_ocp.diagnosis.worth import samples
+from friction_ocp.diagnosis.worth import innovations, samples
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
@@ -288,6 +288,7 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
         "lost": diagnosis.lost,
         "component": component,
         "ratio": diagnosis.remainder.ratio,
+        "ratio_before": innovations(diagnosis.base).ratio,
         "slow_torque": slow,
     }
 

@@ -15,6 +15,7 @@ from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.own_noise import noise_moved
 from friction_ocp.diagnosis.polishing import COARSE, WARM, loosely_joined, polished, timed
+from friction_ocp.diagnosis.sharpening import fitted_sharply
 from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.first_nodes import suggested_point
@@ -68,7 +69,7 @@ def _fitted_base(model: Model) -> FittedModel:
         if noise_moved(fitted.linear.program, model, fitted.footing, _plausible(model, fitted.theta)) < RELAID:
             break
         fitted = _joined(model, _laid(model, fitted.theta), fitted.theta, None)
-    return fitted
+    return fitted_sharply(fitted, model.space.guess)
 
 
 def _laid(model: Model, theta: FloatArray) -> Footing:

@@ -18,6 +18,7 @@ from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
 from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged, nudged_along
+from friction_ocp.diagnosis.sharpening import fitted_sharply
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard, innovations
 from friction_ocp.drive.parts import Drive
@@ -207,6 +208,14 @@ def _base_document(base: FittedModel) -> Json:
 def _bench_of(problem: Problem, base: Json) -> Bench:
     """Return the bench of a base model that stands where `_base_document` says."""
     return Bench(problem, base["footing"], base["point"], Seat(problem.drive, base["point"]))
+
+
+def sharpened(bench: Bench) -> Bench:
+    """Return the bench on a footing that is sharpened, where the current model then leaves no more than noise."""
+    found = fitted_sharply(bench.current, guessed(bench.current, bench.base.model.space))
+    if found is bench.current:
+        return bench
+    return replace(bench, footing=footing_document(found.footing), seat=Seat.of(found))
 
 
 def opened_better(bench: Bench, execution: Execution) -> Bench:

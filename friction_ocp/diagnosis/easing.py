@@ -36,10 +36,7 @@ def missed(program: Program, point: Point) -> float:
 
 def widened(program: Program, factor: float) -> Program:
     """Return a program with wider gaps."""
-    cuts = [
-        cut if cut.gap_weight is None else replace(cut, gap_weight=cut.gap_weight / factor) for cut in program.segments
-    ]
-    return replace(program, segments=tuple(cuts))
+    return replace(program, segments=tuple(cut.widened(factor) for cut in program.segments))
 
 
 def eased(program: Program, point: Point, factor: float) -> Point:

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.diagnosis.excerpts import cut_out, excerpts
+from friction_ocp.diagnosis.gap_law import TorqueGaps
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, slopes_about, unit_covariances
 from friction_ocp.diagnosis.standstill import without_jumps
 from friction_ocp.drive.mechanism import Mechanism
@@ -79,6 +80,9 @@ class Footing:
     """By recording: times of further cuts, s."""
     predicted: bool = False
     """Whether models are compared by short predictions, each from the measured motion, instead."""
+    sharp: tuple[bool, ...] = ()
+    """(outputs,) channels that torque noise moves within the shortest segments by more than their own noise: of these
+    the samples at nodes count, and gaps are as wide as each model makes them. None where there is no such channel."""
 
     @property
     def joined(self) -> bool:
@@ -89,7 +93,8 @@ class Footing:
         """Return the likelihood of some recordings under a model, as a least-squares program."""
         segments = tuple(self._segments(model, item) for item in experiments)
         width = 0.0 * model.speed_scale
-        return Program(model.space, model.drive, model.sweep, experiments, segments, self.noise, width, self.loss)
+        seen = tuple(self._seen(item, cut) for item, cut in zip(experiments, segments, strict=True))
+        return Program(model.space, model.drive, model.sweep, seen, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
         """Return the likelihood of training recordings and static points; the grids are those of the model."""
@@ -99,6 +104,14 @@ class Footing:
     def _regridded(self, item: Experiment, model: Model) -> Experiment:
         stepped = replace(item, grid=item.grid.with_step(model.max_step))
         return seen_by(model, model.drive, stepped, self.inputs)
+
+    def _seen(self, item: Experiment, cut: Segments) -> Experiment:
+        """Return a recording without what torque noise blurs between nodes."""
+        if not self.joined or not any(self.sharp):
+            return item
+        hidden = np.ones(item.measured.shape, dtype=bool) & np.array(self.sharp)
+        hidden[cut.first[:-1]] = False
+        return replace(item, measured=np.where(hidden, np.nan, item.measured), lost=item.lost & ~hidden)
 
     def _segments(self, model: Model, item: Experiment) -> Segments:
         if self.predicted:
@@ -112,10 +125,12 @@ class Footing:
         first = np.unique(np.concatenate([first, further[further < first[-1]]])).astype(np.int64)
         start = np.zeros((len(first) - 1, model.state_scale.size))
         start[0] = start_weight(model, item)
-        weights = gap_roots(model, self, item, first, impulses)
+        law = gap_law(model, self, item, first, impulses) if any(self.sharp) and len(first) > 2 else None
+        numbers = _leaf_numbers(model, self, item.name)
+        weights = law.weights(numbers) if law else gap_roots(model, self, item, first, impulses)
         if model.problem.estimation.initial_state == "measured":
-            return Segments(first, weights, measured=1)
-        return Segments(first, weights, start_weight=start)
+            return Segments(first, weights, measured=1, gap_law=law)
+        return Segments(first, weights, start_weight=start, gap_law=law)
 
 
 def cuts(item: Experiment, seconds: float | None) -> IntArray:
@@ -223,6 +238,20 @@ def gap_roots(
     power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
     covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
+
+
+def gap_law(
+    model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
+) -> TorqueGaps:
+    """Return how the weights of gaps, which `gap_roots` gives at the numbers of the footing, hang on these numbers."""
+    spans, numbers = np.diff(item.grid.time[first]), _leaf_numbers(model, foot, item.name)
+    motions = motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2)
+    (resting,) = slopes_about(model, numbers, np.zeros((1, len(model.drive.state_names))))
+    still = still_gaps(model, foot, item.name, float(np.median(spans)), resting)
+    jumps = {shaft: np.add.reduceat(each**2, first[:-1]) / spans for shaft, each in impulses.items()}
+    turning = driving(model.problem.drive, foot.numbers[item.name])
+    noise = {channel.name: input_noise(model, channel) for _, channel, _ in turning}
+    return TorqueGaps.laid(model, noise, spans, motions, jumps, still)
 
 
 def _jump_power(

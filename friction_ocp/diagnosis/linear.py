@@ -74,7 +74,7 @@ class LinearRecording:
     """One recording of a program at a point: the map from changes of the simulation to changes of the residuals."""
 
     def __init__(self, program: Program, index: int, point: Point) -> None:
-        self.item, self.cut = program.experiments[index], program.segments[index]
+        self.item, self.cut = program.experiments[index], program.joined(index, point.theta)
         self.index, self.nodes = index, point.nodes[index]
         self.states = self.nodes.shape[1]
         result = program.simulate(index, point, derivatives=True)
@@ -95,6 +95,9 @@ class LinearRecording:
         by_theta = result.dy[:, :, self.states :] @ self.slope * self.scaling[:, :, None]
         end_theta = result.dend[:-1, :, self.states :] @ self.slope
         columns = self._stack_columns(by_theta, end_theta, self._start_slopes(program, point))
+        if self.cut.gap_law is not None and self.cut.count > 1:
+            wider = program.gap_slopes(index, point.theta, self.end[:-1] - self.nodes[1:])
+            columns[self.seen.size :][: wider.shape[0] * self.states] += wider.reshape(-1, point.theta.size)
         direct = columns + self._measured_slopes(program, point)
         self.following = self._following(direct)
         self.jacobian = self._followed(direct, self.following)

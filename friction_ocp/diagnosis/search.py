@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better
+from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better, sharpened
 from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
@@ -120,6 +120,7 @@ class Search:
             if done.accepted is None:
                 break
             self._take(done.accepted)
+            self.bench = sharpened(self.bench)
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
                 if not self._left_out.fall_short(self.bench):

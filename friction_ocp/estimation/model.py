@@ -380,14 +380,20 @@ def slopes_at(
 
     Nor with its fall beyond standstill, which is infinitely steep there for exponents below 1: what rests sticks.
     """
+    slope = slope_function(drive, inputs)
+    return [np.asarray(slope(each, numbers)) for each in at]
+
+
+def slope_function(drive: SteppedDrive, inputs: list[float]) -> ca.Function:
+    """Return (states, numbers) -> (states, states) what `slopes_at` gives."""
     tiny, states = 1e-6, len(drive.state_names)
-    falls = np.array([".omega_s" in name for name in drive.parameter_names], dtype=bool)
-    numbers = np.where(falls, NEVER, numbers)
-    x = ca.SX.sym("x", states)
+    x, numbers = ca.SX.sym("x", states), ca.SX.sym("numbers", len(drive.parameter_names))
+    falls = [".omega_s" in name for name in drive.parameter_names]
+    steady = ca.vertcat(*[ca.SX(NEVER) if falls[k] else numbers[k] for k in range(len(falls))])
     width = np.full(len(drive.mechanism.topology.roots) + 1, 1e9)
-    after = drive.step.call([x, ca.DM(inputs), ca.DM(numbers), ca.DM(tiny), ca.DM(width)], True, False)[0]
-    slope = ca.Function("slope", [x], [ca.densify(ca.jacobian(after, x))])
-    return [(np.asarray(slope(each)) - np.eye(states)) / tiny for each in at]
+    after = drive.step.call([x, ca.DM(inputs), steady, ca.DM(tiny), ca.DM(width)], True, False)[0]
+    slope = (ca.jacobian(after, x) - ca.SX.eye(states)) / tiny
+    return ca.Function("slope", [x, numbers], [ca.densify(slope)])
 
 
 def typical_inputs(problem: Problem, drive: SteppedDrive) -> list[float]:

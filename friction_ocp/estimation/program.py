@@ -60,6 +60,11 @@ class Linearisation:
     blocks: tuple[Blocks, ...]
 
 
+STEP = 1e-3
+"""Step over which the widths of gaps are differentiated, over the size of a parameter: they are smooth, and the rates
+of the motion behind them have few digits."""
+
+
 @dataclass(frozen=True)
 class Tether:
     """What holds parameters near a point, beside their priors: what is known of them from elsewhere."""
@@ -264,7 +269,21 @@ class Program:
 
     def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
         """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
-        return self.segments[index].weighed(end[:-1] - point.nodes[index][1:])
+        return self.joined(index, point.theta).weighed(end[:-1] - point.nodes[index][1:])
+
+    def joined(self, index: int, theta: FloatArray) -> Segments:
+        """Return the segments of a recording with the gaps that they have at some parameters."""
+        return self.segments[index].at(self.space.numbers(theta, self.experiments[index].name))
+
+    def gap_slopes(self, index: int, theta: FloatArray, gaps: FloatArray) -> FloatArray:
+        """Return (gaps, states, parameters) how gaps (gaps, states) over what is allowed change with that alone."""
+        law, scale = self.segments[index].gap_law, STEP * np.maximum(np.abs(theta), self.space.scale)
+        if law is None or not theta.size:
+            return np.zeros((*gaps.shape, theta.size))
+        numbers, slope = self.space.numbers_and_slope(theta, self.experiments[index].name)
+        moves = np.zeros((theta.size, numbers.size))
+        moves[:, list(self.space.active)] = (slope * scale).T
+        return law.changes(numbers, moves, gaps) / scale
 
     def start_errors(self, index: int, point: Point) -> FloatArray:
         """Return (tied, states) how far tied nodes are from what was measured, over their deviations."""
@@ -320,21 +339,25 @@ class Program:
         system = NormalEquations.empty(cut.count, states, count)
         system.cost += float(np.sum(score.cost))
         system.add_squares(slice(0, cut.count), score.square, score.gradient, slope)
-        self._add_gaps(cut, nodes, result, slope, system)
+        self._add_gaps(index, point, result, slope, system)
         self._add_start(index, point, start_slope, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
     def _add_gaps(
-        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: NormalEquations
+        self, index: int, point: Point, result: SweepResult, slope: FloatArray, system: NormalEquations
     ) -> None:
+        cut, nodes = self.joined(index, point.theta), point.nodes[index]
         if cut.gap_weight is None or cut.count < 2:
             return
         assert result.dend is not None
         weight, states = cut.gap_weight, nodes.shape[1]
         before, after = slice(0, cut.count - 1), slice(1, cut.count)
-        gap = cut.weighed(result.end[:-1] - nodes[1:])
-        jacobian = weight @ result.dend[:-1]
+        jumps = result.end[:-1] - nodes[1:]
+        gap, jacobian = cut.weighed(jumps), weight @ result.dend[:-1]
+        if cut.gap_law is not None and len(slope):
+            by_theta = jacobian[:, :, states:] @ slope + self.gap_slopes(index, point.theta, jumps)
+            jacobian, slope = np.concatenate([jacobian[:, :, :states], by_theta], axis=2), np.eye(point.theta.size)
         system.cost += 0.5 * float(np.sum(gap**2))
         system.add(before, jacobian, gap, np.ones(gap.shape), slope)
         back = weight.transpose(0, 2, 1)

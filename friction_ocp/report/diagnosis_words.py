@@ -64,8 +64,8 @@ def _lost(result: Json) -> bool:
 
 def _one_step(result: Json) -> str:
     """Say what all that was added does for the errors of one-step predictions."""
-    first = part(rows(result, "rounds")[0], "excess")["ratio"]
-    before, after = (significant(ratio, 2) for ratio in (first, part(result, "remainder")["ratio"]))
+    remainder = part(result, "remainder")
+    before, after = (significant(remainder[key], 2) for key in ("ratio_before", "ratio"))
     return f"Errors of one-step predictions have {after} times the power of their noise with it, {before} times without"
 
 

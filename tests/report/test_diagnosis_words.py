@@ -100,8 +100,8 @@ def test_what_does_not_carry_over_is_no_part() -> None:
 def test_free_runs_that_are_lost_in_any_case_are_no_evidence() -> None:
     """Predictions from sample to sample tell what was gained, and nothing grows where all runs lead nowhere."""
     gap = {"shrink": {"overall": -19.9, "interval95": [-21.7, -18.6]}}
-    remainder = {"significant": True, "carries_over": False, "lost": True, "ratio": 140.0}
-    rounds = [decided(COGGING, 0.0) | {"excess": {"ratio": 375.0}}]
+    remainder = {"significant": True, "carries_over": False, "lost": True, "ratio": 140.0, "ratio_before": 375.0}
+    rounds = [decided(COGGING, 0.0)]
     said = diagnosis_sentence(result("unknown_effect", gap=gap, accepted=[COGGING], remainder=remainder, rounds=rounds))
     assert said.startswith("Explained in part: the model lacked cogging at servo. ")
     assert "140 times the power of their noise with it, 375 times without" in said
@@ -114,7 +114,7 @@ def test_free_runs_that_part_by_themselves_are_told(verdict: str) -> None:
     """They come no closer, and noise alone sets them as far apart: what goes from sample to sample is told."""
     rounds = [{"excess": {"ratio": 152.0, "p_value": 0.0}}]
     for stray in (True, False):
-        remainder = {"significant": False, "stray": stray, "ratio": 1.1}
+        remainder = {"significant": False, "stray": stray, "ratio": 1.1, "ratio_before": 152.0}
         said = diagnosis_sentence(result(verdict, accepted=[COGGING], remainder=remainder, rounds=rounds))
         assert ("Free runs say little here" in said) is stray
         assert ("1.1 times the power of their noise with it, 152 times without" in said) is stray
