@@ -50,18 +50,20 @@ def gone_back(bench: Bench, extended: FittedModel, first: bool) -> Bench | None:
 
 
 def without_superfluous(
-    bench: Bench, accepted: list[Key], level: float, rng: np.random.Generator, run: Execution
+    bench: Bench, accepted: list[Key], level: float, rng: np.random.Generator, run: Execution, latest: bool = True
 ) -> tuple[FittedModel, list[Key]]:
-    """Drop earlier additions that the latest one has made superfluous on recordings left out.
+    """Drop earlier additions that the `latest` one, which stays, has made superfluous on recordings left out.
 
     Superfluous is what neither gains for certain there nor is worth an addition in sum; beside what leaves no more than
-    noise, what is not worth its parameters.
+    noise, what is not worth its parameters. Where none is the latest, one stays.
     """
     current, benchmark = bench.current, Benchmark(bench.current)
-    earlier = list(dict.fromkeys(accepted[:-1]))
+    earlier = list(dict.fromkeys(accepted[:-1] if latest else accepted))
     known = _fits(bench, run, {key: _Wanted(_less(accepted, key)) for key in earlier})
     for key in earlier:
         kept = _less(accepted, key)
+        if not kept and not latest:
+            break
         simpler = known[key] if current is bench.current else without_addition(current, _drive(bench, kept))
         if simpler is None or not simpler.holds:
             continue

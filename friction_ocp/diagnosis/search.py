@@ -120,7 +120,6 @@ class Search:
             if done.accepted is None:
                 break
             self._take(done.accepted)
-            self.bench = sharpened(self.bench)
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
                 if not self._left_out.fall_short(self.bench):
@@ -133,6 +132,8 @@ class Search:
             self.bench = self.bench.at(current)
         if self.accepted and not self._left_out.helps(self.bench, self.level):
             self._withdraw()
+        if self.accepted:
+            self._sharpen()
 
     def _seems_missing(self, first: Round) -> bool:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
@@ -287,6 +288,14 @@ class Search:
     def _with(self, rival: Rival) -> Bench:
         """Return the bench of a rival's model: one that is far off is freed only now that it is to be accepted."""
         return self.bench.at(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
+
+    def _sharpen(self) -> None:
+        """Go over additions again where channels show more than torque noise, on a footing that goes by that."""
+        bench = sharpened(self.bench)
+        if bench is not self.bench and len(set(self.accepted)) > 1:
+            found = without_superfluous(bench, self.accepted, self.level, self.rng, self.run, latest=False)
+            bench, self.accepted = bench.at(found[0]), found[1]
+        self.bench = bench
 
     def _exchange(self) -> None:
         found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)
