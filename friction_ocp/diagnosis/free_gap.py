@@ -18,6 +18,8 @@ from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 BLOCKS = 24
 RESAMPLES = 1000
+OUTGROWN = 1e100
+"""Error of an unstable simulation over the noise floor, beyond which it is only this: its square is still a number."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def _errors(fitted: FittedModel, runs: tuple[FreeRun, ...]) -> FreeErrors:
     power: list[FloatArray] = []
     count: list[FloatArray] = []
     for run in runs:
-        scaled = ((run.simulated - run.measured) / floors) ** 2
+        scaled = np.clip((run.simulated - run.measured) / floors, -OUTGROWN, OUTGROWN) ** 2
         seen = np.isfinite(scaled)
         edges = np.linspace(0, run.time.size, BLOCKS + 1).astype(int)[:-1]
         power.append(np.add.reduceat(np.where(seen, scaled, 0.0), edges, axis=0))

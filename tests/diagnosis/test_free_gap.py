@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from diagnosis_cases import axis, write_case
 
+from friction_ocp.diagnosis import free_gap
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import BLOCKS, FreeErrors, comes_closer, free_errors, gap_map
-from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.score import FreeRun
 from friction_ocp.problem_file.load import load_problem
+from friction_ocp.simulation.grid import FloatArray
 
 NOISY = 0.02
 """Noise of a current, A."""
@@ -35,6 +38,22 @@ def test_samples_that_a_delay_loses_are_left_out_of_the_map(tmp_path: Path) -> N
     assert len(cells) == len(gap_map(base, before, before))
     for cell in cells:
         assert np.isfinite(cell.before) and cell.before == pytest.approx(cell.after)
+
+
+def test_a_simulation_that_outgrows_all_numbers_is_as_far_off_as_can_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its errors have squares beyond all numbers, and count like any other."""
+    base = fit_base(prepare(load_problem(write_case(tmp_path, axis()))))
+    before, simulate = free_errors(base, held_out=False), free_gap.simulate_recordings
+
+    def unstable(model: Model, items: tuple[Experiment, ...], theta: FloatArray) -> tuple[FreeRun, ...]:
+        return tuple(replace(run, simulated=run.simulated + 1e200) for run in simulate(model, items, theta))
+
+    monkeypatch.setattr(free_gap, "simulate_recordings", unstable)
+    errors = free_errors(base, held_out=False)
+    assert np.array_equal(errors.count, before.count)
+    assert np.all(np.isfinite(errors.power)) and np.all(errors.power > 1e150)
 
 
 def errors_of(power: float, seed: int, drift: float = 0.0) -> FreeErrors:
