@@ -256,7 +256,7 @@ def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
             superseded=tuple(superseded),
             accepted=tuple(dict.fromkeys(accepted)),
             level=level,
-            before=free_errors(base, held_out=True),
+            before=free_errors(search.fitted_base, held_out=True),
             after=free_errors(current, held_out=True),
             remainder=left,
             slow=ended.slow,

@@ -14,6 +14,7 @@ from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.left_out import LeftOut
@@ -70,6 +71,7 @@ class Search:
     outdone: Problem | None = None
     """The problem with its inputs read another way, where that alone does more than any addition: no more is tried."""
     _begun: int = 0
+    _fitted_base: FittedModel | None = None
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
@@ -82,6 +84,11 @@ class Search:
         if longest > LONG:
             shorter = "`effort` or `samples` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
             self.tell(f"the search may take about {longest / 60.0:.0f} min on one processor; {shorter}", 0.0)
+
+    @property
+    def fitted_base(self) -> FittedModel:
+        """The base model on the footing that it was fitted on, which need not be the one that the search ends on."""
+        return self._fitted_base or self.bench.base
 
     @property
     def effort(self) -> float:
@@ -291,11 +298,13 @@ class Search:
 
     def _sharpen(self) -> None:
         """Go over additions again where channels show more than torque noise, on a footing that goes by that."""
-        bench = sharpened(self.bench)
-        if bench is not self.bench and len(set(self.accepted)) > 1:
+        bench, base = sharpened(self.bench), self.bench.base
+        if bench is self.bench:
+            return
+        if len(set(self.accepted)) > 1:
             found = without_superfluous(bench, self.accepted, self.level, self.rng, self.run, latest=False)
             bench, self.accepted = bench.at(found[0]), found[1]
-        self.bench = bench
+        self.bench, self._fitted_base = bench, base
 
     def _exchange(self) -> None:
         found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)

@@ -25,6 +25,10 @@ from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yar
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 from friction_ocp.simulation.sweep import Sweep
 
+STEP = 1e-3
+"""Step over which the widths of gaps are differentiated, over the size of a parameter: they are smooth, and the rates
+of the motion behind them have few digits."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -58,11 +62,6 @@ class Linearisation:
     theta_theta: FloatArray
     theta_gradient: FloatArray
     blocks: tuple[Blocks, ...]
-
-
-STEP = 1e-3
-"""Step over which the widths of gaps are differentiated, over the size of a parameter: they are smooth, and the rates
-of the motion behind them have few digits."""
 
 
 @dataclass(frozen=True)
