@@ -243,12 +243,15 @@ def gap_roots(
 def gap_law(
     model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
 ) -> TorqueGaps:
-    """Return how the weights of gaps, which `gap_roots` gives at the numbers of the footing, hang on these numbers."""
+    """Return gaps that are as wide as noise of the inputs makes them at any numbers of the drive.
+
+    Where the drive moves, and how far states may jump that no noise enters, is that of the footing, as in `gap_roots`.
+    """
     spans, numbers = np.diff(item.grid.time[first]), _leaf_numbers(model, foot, item.name)
     motions = motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2)
     (resting,) = slopes_about(model, numbers, np.zeros((1, len(model.drive.state_names))))
     still = still_gaps(model, foot, item.name, float(np.median(spans)), resting)
-    jumps = {shaft: np.add.reduceat(each**2, first[:-1]) / spans for shaft, each in impulses.items()}
+    jumps = _jumps_between(item, first, impulses)
     turning = driving(model.problem.drive, foot.numbers[item.name])
     noise = {channel.name: input_noise(model, channel) for _, channel, _ in turning}
     return TorqueGaps.laid(model, noise, spans, motions, jumps, still)
@@ -258,15 +261,20 @@ def _jump_power(
     model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
 ) -> FloatArray:
     """Return (groups, segments) the power density of acceleration that jumps of inputs may hide."""
-    spans = np.diff(item.grid.time[first])
     mech = model.drive.mechanism
     inertias = group_inertias(mech, _known_numbers(model, foot, item.name))
-    power = np.zeros((len(inertias), spans.size))
-    for shaft, values in impulses.items():
+    power = np.zeros((len(inertias), len(first) - 1))
+    for shaft, density in _jumps_between(item, first, impulses).items():
         group = mech.topology.group_of[shaft]
         ratio = speed_ratio(mech, foot.numbers[item.name], shaft) / max(float(inertias[group]), 1e-300)
-        power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
+        power[group] += density * ratio**2
     return power
+
+
+def _jumps_between(item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return by shaft (segments,) the power density, (N m)^2/Hz, of torque that jumps of inputs may hide."""
+    spans = np.diff(item.grid.time[first])
+    return {shaft: np.add.reduceat(each**2, first[:-1]) / spans for shaft, each in impulses.items()}
 
 
 def _leaf_numbers(model: Model, foot: Footing, recording: str) -> FloatArray:

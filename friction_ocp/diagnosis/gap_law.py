@@ -18,7 +18,8 @@ import numpy as np
 from friction_ocp.diagnosis.gathered_noise import alike, sampled_covariances
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
-from friction_ocp.estimation.model import Model, slope_function, typical_inputs
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.modes import slope_function, typical_inputs
 from friction_ocp.estimation.torque_noise import driving, input_power
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
@@ -138,7 +139,7 @@ class TorqueGaps:
 
     @cached_property
     def _answer(self) -> ca.Function:
-        return _answer(self.model.drive.mechanism, self.model.space.leaf_names, self.shafts)
+        return _answer(self.model.drive.mechanism, self.shafts)
 
     @cached_property
     def _matters(self) -> BoolArray:
@@ -155,14 +156,10 @@ class TorqueGaps:
         return [factor for _, _, factor in driving(self.model.problem.drive, table)]
 
 
-def _answer(mech: Mechanism, names: Sequence[str], shafts: Sequence[str]) -> ca.Function:
+def _answer(mech: Mechanism, shafts: Sequence[str]) -> ca.Function:
     """Return numbers of the drive -> (groups, shafts) the acceleration of each group by a torque on each shaft."""
-    numbers = ca.SX.sym("numbers", len(names))
     moved = ca.SX.zeros(len(mech.topology.roots), len(shafts))
     for k, shaft in enumerate(shafts):
         group = mech.topology.group_of[shaft]
         moved[group, k] = mech.topology.speed_ratio[shaft] / ca.fmax(mech.inertia(group), 1e-300)
-    table = {name: numbers[k] for k, name in enumerate(names)}
-    known = [table.get(name, ca.SX(1.0)) for name in mech.parameters]
-    (answer,) = ca.substitute([moved], [ca.vertcat(*mech.parameters.values())], [ca.vertcat(*known)])
-    return ca.Function("answer", [numbers], [ca.densify(answer)])
+    return ca.Function("answer", [ca.vertcat(*mech.parameters.values())], [ca.densify(moved)])

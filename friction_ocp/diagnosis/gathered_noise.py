@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.model import Model, slopes_at, typical_inputs
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.modes import slopes_at, typical_inputs
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 SHORT, TERMS = 0.5, 18

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.drive.parts import Drive
-from friction_ocp.estimation.model import Model, slowest_period
+from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.modes import slowest_period
 
 LONGEST_WINDOW = 10.0
 PERIODS = 10.0

@@ -13,7 +13,8 @@ from friction_ocp.drive.units import signal_unit
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.first_nodes import suggested_point
-from friction_ocp.estimation.model import prepare, slowest_period
+from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.modes import slowest_period
 from friction_ocp.estimation.problem import EstimationOptions, RecordingUse
 from friction_ocp.estimation.stages import free_run
 from friction_ocp.excitation.limits import Limits
