@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
 from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged, nudged_along
-from friction_ocp.diagnosis.sharpening import fitted_sharply
+from friction_ocp.diagnosis.sharpening import fitted_sharply, seen_on
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
 from friction_ocp.diagnosis.worth import Standard, innovations
 from friction_ocp.drive.parts import Drive
@@ -215,7 +215,8 @@ def sharpened(bench: Bench) -> Bench:
     found = fitted_sharply(bench.current, guessed(bench.current, bench.base.model.space))
     if found is bench.current:
         return bench
-    return replace(bench, footing=footing_document(found.footing), seat=Seat.of(found))
+    base = seen_on(found.footing, bench.base)
+    return replace(bench, footing=footing_document(found.footing), base_point=point_document(base), seat=Seat.of(found))
 
 
 def opened_better(bench: Bench, execution: Execution) -> Bench:

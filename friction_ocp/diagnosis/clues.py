@@ -12,6 +12,7 @@ import numpy as np
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import group_inertias
 from friction_ocp.diagnosis.linear import LinearRecording
+from friction_ocp.drive.input_noise import NOISE
 from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
 from friction_ocp.drive.parts import Drive, Motor
@@ -24,7 +25,7 @@ from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.static_points import StaticTerm
-from friction_ocp.estimation.torque_noise import speed_ratio
+from friction_ocp.estimation.torque_noise import driving, speed_ratio
 from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import Squares
@@ -131,10 +132,10 @@ def _watch(fitted: FittedModel) -> _Watch:
 
 
 def states_along(fitted: FittedModel, index: int) -> FloatArray:
-    """Return (n, states) of a recording as the fitted model passes through it."""
+    """Return (n, states) of a recording as the fitted model passes through it, without noise of inputs."""
     result = fitted.linear.program.simulate(index, fitted.linear.point, with_states=True)
     assert result.states is not None
-    return result.states
+    return result.states[:, : len(fitted.model.drive.state_names)]
 
 
 def _table(fitted: FittedModel, index: int, watch: _Watch) -> dict[str, FloatArray]:
@@ -159,7 +160,7 @@ def _missing(fitted: FittedModel, smoother: LinearRecording, watch: _Watch) -> M
     """Return the mean torque that would close the gap behind each segment, and the motion with all these torques."""
     mech, first = fitted.model.drive.mechanism, smoother.cut.first
     middle = ((first[:-2] + first[1:-1]) // 2).astype(np.int64)
-    name = smoother.item.name
+    name, hidden = smoother.item.name, _hidden_by_noise(fitted, smoother)
     inertias = group_inertias(mech, {**fitted.footing.numbers[name], **fitted.values})
     spans = np.diff(smoother.item.grid.time[first])[:-1]
     missing: dict[str, FloatArray] = {}
@@ -171,12 +172,24 @@ def _missing(fitted: FittedModel, smoother: LinearRecording, watch: _Watch) -> M
             jump = smoother.nodes[1:, at] - smoother.end[:-1, at]
             ratio = speed_ratio(mech, fitted.footing.numbers[name], shaft.name)
             torque = float(inertias[group]) * jump / spans / ratio
-        missing[shaft.name] = torque
-    nodes = watch(smoother.item, smoother.nodes, first[:-1])
+        missing[shaft.name] = torque + hidden.get(shaft.name, 0.0)
+    nodes = watch(smoother.item, smoother.nodes[:, : len(mech.state_names)], first[:-1])
     motion = {name: 0.5 * (values[1:] + values[:-1]) for name, values in nodes.items()}
     joints = [item.name for item in mech.topology.elastic]
     twist, torque = ({name: motion[f"{name}.{kind}"] for name in joints} for kind in ("twist", "carried"))
     return Missing(middle, missing, _of(mech.drive, motion, "theta"), _of(mech.drive, motion, "omega"), twist, torque)
+
+
+def _hidden_by_noise(fitted: FittedModel, smoother: LinearRecording) -> dict[str, FloatArray]:
+    """Return by shaft (segments - 1,) the mean torque that a fit calls noise of a measured input."""
+    drive, found = smoother.drive, dict[str, FloatArray]()
+    numbers = {**fitted.footing.numbers[smoother.item.name], **fitted.values}
+    for shaft, channel, factor in driving(fitted.model.problem.drive, numbers):
+        if channel.name in drive.noisy_inputs:
+            noise = smoother.nodes[:, drive.state_names.index(channel.name + NOISE)]
+            mean = noise[:-1] if channel.hold == "zero" else 0.5 * (noise[:-1] + noise[1:])
+            found[shaft] = found.get(shaft, 0.0) - factor * mean
+    return found
 
 
 def _smoothers(fitted: FittedModel, samples: int, size: Mapping[str, float]) -> tuple[LinearRecording, ...]:

@@ -108,8 +108,8 @@ class Contrast:
 
 def contrast(model: Model, base: LinearProgram, drive: Drive) -> Contrast:
     """Build the simulation of a candidate drive; its code gives values only."""
-    after = stepped(drive)
+    after, noisy = stepped(drive), base.program.drive.noisy_inputs
     space = parameter_space(replace(model.problem, drive=drive), after.parameter_names)
     known = dict(zip(model.space.names, base.point.theta, strict=True))
     static = tuple(static_term(use, drive, space) for use in model.problem.static)
-    return Contrast(model, base, space, sweep_of(drive, (), values_only=True), known, static)
+    return Contrast(model, base, space, sweep_of(drive, (), values_only=True, noisy=noisy), known, static)

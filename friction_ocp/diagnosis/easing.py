@@ -36,7 +36,10 @@ def missed(program: Program, point: Point) -> float:
 
 def widened(program: Program, factor: float) -> Program:
     """Return a program with wider gaps."""
-    return replace(program, segments=tuple(cut.widened(factor) for cut in program.segments))
+    cuts = [
+        cut if cut.gap_weight is None else replace(cut, gap_weight=cut.gap_weight / factor) for cut in program.segments
+    ]
+    return replace(program, segments=tuple(cuts))
 
 
 def eased(program: Program, point: Point, factor: float) -> Point:
@@ -75,7 +78,7 @@ def along(program: Program, other: Program, point: Point) -> Point:
     for nodes, old, cut, before in zip(passed.nodes, point.nodes, program.segments, other.segments, strict=True):
         at = np.searchsorted(cut.first, before.first[:-1])
         same = cut.first[at] == before.first[:-1]
-        nodes[at[same]] = old[same]
+        nodes[at[same], : old.shape[1]] = old[same]
     return passed
 
 

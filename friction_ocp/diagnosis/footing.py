@@ -11,9 +11,10 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.diagnosis.excerpts import cut_out, excerpts
-from friction_ocp.diagnosis.gap_law import TorqueGaps
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, slopes_about, unit_covariances
+from friction_ocp.diagnosis.noisy_nodes import sampled, with_noise
 from friction_ocp.diagnosis.standstill import without_jumps
+from friction_ocp.drive.input_noise import with_input_noise
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
@@ -36,6 +37,7 @@ from friction_ocp.estimation.torque_noise import (
 )
 from friction_ocp.simulation.grid import FloatArray, IntArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
+from friction_ocp.simulation.sweep import sweep_of
 
 FOLDS = 4
 """Pieces of a single training recording, to leave out one at a time."""
@@ -54,6 +56,8 @@ SMOOTH = 4.0 * np.sqrt(6.0)
 """Second difference over the noise of an input above which it jumps: four deviations of what noise alone bends."""
 STILL_GAP, LOOSE_GAP = 1e-5, 1e-3
 """Gap over the typical size of a state that no noise enters, and the most for a deflection."""
+QUIET_GAP = 0.01
+"""Torque of such a jump over that of the noise of a sample, where noise is told from sample to sample."""
 NEGLIGIBLE_GAP = 0.1
 """Gap over the noise floor that stands for a state that no noise enters."""
 
@@ -80,9 +84,8 @@ class Footing:
     """By recording: times of further cuts, s."""
     predicted: bool = False
     """Whether models are compared by short predictions, each from the measured motion, instead."""
-    sharp: tuple[bool, ...] = ()
-    """(outputs,) channels that torque noise moves within the shortest segments by more than their own noise: of these
-    the samples at nodes count, and gaps are as wide as each model makes them. None where there is no such channel."""
+    noisy_inputs: tuple[str, ...] = ()
+    """Inputs whose noise is an unknown of every sample; where there are such, a segment is one sample."""
 
     @property
     def joined(self) -> bool:
@@ -92,9 +95,11 @@ class Footing:
     def program(self, model: Model, experiments: tuple[Experiment, ...]) -> Program:
         """Return the likelihood of some recordings under a model, as a least-squares program."""
         segments = tuple(self._segments(model, item) for item in experiments)
-        width = 0.0 * model.speed_scale
-        seen = tuple(self._seen(item, cut) for item, cut in zip(experiments, segments, strict=True))
-        return Program(model.space, model.drive, model.sweep, seen, segments, self.noise, width, self.loss)
+        width, drive, sweep = 0.0 * model.speed_scale, model.drive, model.sweep
+        if self.noisy_inputs:
+            sweep = sweep_of(model.problem.drive, sweep.active, noisy=self.noisy_inputs)
+            drive = sweep.drive
+        return Program(model.space, drive, sweep, experiments, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
         """Return the likelihood of training recordings and static points; the grids are those of the model."""
@@ -105,19 +110,11 @@ class Footing:
         stepped = replace(item, grid=item.grid.with_step(model.max_step))
         return seen_by(model, model.drive, stepped, self.inputs)
 
-    def _seen(self, item: Experiment, cut: Segments) -> Experiment:
-        """Return a recording without what torque noise blurs between nodes."""
-        if not self.joined or not any(self.sharp):
-            return item
-        hidden = np.ones(item.measured.shape, dtype=bool) & np.array(self.sharp)
-        hidden[cut.first[:-1]] = False
-        return replace(item, measured=np.where(hidden, np.nan, item.measured), lost=item.lost & ~hidden)
-
     def _segments(self, model: Model, item: Experiment) -> Segments:
         if self.predicted:
             return measured_from(item)
         impulses = {} if self.segment_s is None else input_impulses(model, item, self.numbers[item.name])
-        first = cuts(item, self.segment_s)
+        first = sampled(item) if self.noisy_inputs else cuts(item, self.segment_s)
         if impulses:
             total = sum(np.square(values) for values in impulses.values())
             first = with_cuts(first, np.asarray(total))
@@ -125,12 +122,15 @@ class Footing:
         first = np.unique(np.concatenate([first, further[further < first[-1]]])).astype(np.int64)
         start = np.zeros((len(first) - 1, model.state_scale.size))
         start[0] = start_weight(model, item)
-        law = gap_law(model, self, item, first, impulses) if any(self.sharp) and len(first) > 2 else None
-        numbers = _leaf_numbers(model, self, item.name)
-        weights = law.weights(numbers) if law else gap_roots(model, self, item, first, impulses)
-        if model.problem.estimation.initial_state == "measured":
-            return Segments(first, weights, measured=1, gap_law=law)
-        return Segments(first, weights, start_weight=start, gap_law=law)
+        quiet = replace(self, density={}) if self.noisy_inputs else None
+        weights = gap_roots(model, self, item, first, impulses, quiet)
+        measured = model.problem.estimation.initial_state == "measured"
+        found = Segments(first, weights, 1) if measured else Segments(first, weights, start_weight=start)
+        return self._with_noise(model, item, found) if self.noisy_inputs else found
+
+    def _with_noise(self, model: Model, item: Experiment, segments: Segments) -> Segments:
+        known = {channel.name: input_noise(model, channel)[0] for channel in model.problem.drive.inputs}
+        return with_noise(with_input_noise(model.drive, self.noisy_inputs), item, segments, known)
 
 
 def cuts(item: Experiment, seconds: float | None) -> IntArray:
@@ -240,23 +240,6 @@ def gap_roots(
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
 
 
-def gap_law(
-    model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
-) -> TorqueGaps:
-    """Return gaps that are as wide as noise of the inputs makes them at any numbers of the drive.
-
-    Where the drive moves, and how far states may jump that no noise enters, is that of the footing, as in `gap_roots`.
-    """
-    spans, numbers = np.diff(item.grid.time[first]), _leaf_numbers(model, foot, item.name)
-    motions = motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2)
-    (resting,) = slopes_about(model, numbers, np.zeros((1, len(model.drive.state_names))))
-    still = still_gaps(model, foot, item.name, float(np.median(spans)), resting)
-    jumps = _jumps_between(item, first, impulses)
-    turning = driving(model.problem.drive, foot.numbers[item.name])
-    noise = {channel.name: input_noise(model, channel) for _, channel, _ in turning}
-    return TorqueGaps.laid(model, noise, spans, motions, jumps, still)
-
-
 def _jump_power(
     model: Model, foot: Footing, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
 ) -> FloatArray:
@@ -336,11 +319,14 @@ def still_gaps(model: Model, foot: Footing, recording: str, span: float, slopes:
             if state in model.drive.state_names:
                 at = model.drive.state_names.index(state)
                 size[at] = min(size[at], limit)
+    if foot.noisy_inputs:
+        size = np.minimum(size, QUIET_GAP * _loose_gaps(model, foot, recording, span, slopes))
     return np.maximum(size, 1e-12 * model.state_scale)
 
 
 def _loose_gaps(model: Model, foot: Footing, recording: str, span: float, slopes: FloatArray) -> FloatArray:
-    """Return (k,) how far deflections of bristles and loops may jump, which `slopes` (states, k) show in the rates.
+    """Return (k,) how far states may jump, deflections of bristles and loops above all, which `slopes` (states, k) show
+    in the rates.
 
     As far as changes the power of their torque, at typical speeds, by that of torque noise over a segment: a stiffness
     that changes moves them all, and does so in steps as long as gaps let it.

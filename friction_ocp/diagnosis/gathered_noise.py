@@ -38,56 +38,14 @@ def unit_covariances(model: Model, slopes: FloatArray, spans: FloatArray) -> Flo
     return _gathered(slopes, power, spans)
 
 
-def sampled_covariances(model: Model, slopes: FloatArray, spans: FloatArray, step: float) -> FloatArray:
-    """Return what `unit_covariances` does, of noise that stays for `step`, s, or over the span if that is less.
-
-    So does noise of a signal that is sampled: what follows it at once is moved by no more than its deviation, where
-    white noise would move it without limit.
-    """
-    mech, states = model.drive.mechanism, slopes.shape[1]
-    times = np.maximum(np.round(spans / step), 1.0)
-    along, turned = _held(slopes, spans / times)
-    moved = np.zeros((len(mech.topology.roots), spans.size, states, 1))
-    for k, group in enumerate(mech.free_groups):
-        moved[group] = turned[:, :, [len(mech.angle_groups) + k]] / np.sqrt(spans / times)[:, None, None]
-    each: FloatArray = moved @ np.swapaxes(moved, 2, 3)
-    found = each
-    with np.errstate(over="ignore", invalid="ignore"):  # over long spans what is unstable outgrows all numbers
-        for k in range(1, int(np.max(times, initial=1.0))):
-            further = along @ found @ np.swapaxes(along, 1, 2) + each
-            found = np.where((times > k)[:, None, None], further, found)
-    return found
-
-
-def _held(slopes: FloatArray, spans: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (spans, n, n) e^(A t) and its integral over t, by Taylor series and doubling as in `_gathered`."""
-    doublings = _doublings(slopes, spans)
-    short = (spans / 2**doublings)[:, None, None]
-    step, identity = slopes * short, np.eye(slopes.shape[1])
-    term = np.broadcast_to(identity, step.shape)
-    along: FloatArray = term
-    gone: FloatArray = term * short
-    for k in range(1, TERMS):
-        term = term @ step / k
-        along, gone = along + term, gone + term * short / (k + 1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(doublings):
-            along, gone = along @ along, gone + along @ gone
-    return along, gone
-
-
-def _doublings(slopes: FloatArray, spans: FloatArray) -> int:
-    size = float(np.max(np.abs(slopes).sum(axis=1).max(axis=1) * spans, initial=0.0))
-    return max(0, int(np.ceil(np.log2(max(size / SHORT, 1.0)))))
-
-
 def _gathered(slopes: FloatArray, power: FloatArray, spans: FloatArray) -> FloatArray:
     """Return P (groups, spans, n, n) after spans, s, from dP/dt = A P + P A' + Q, P = 0; A = slopes (spans, n, n).
 
     Over a short span by the Taylor series P = sum t^k / k! L^(k - 1)(Q), L(X) = A X + X A', then doubled:
     P(2 t) = P(t) + e^(A t) P(t) e^(A' t), which does not overflow where something decays fast.
     """
-    doublings = _doublings(slopes, spans)
+    size = float(np.max(np.abs(slopes).sum(axis=1).max(axis=1) * spans, initial=0.0))
+    doublings = max(0, int(np.ceil(np.log2(max(size / SHORT, 1.0)))))
     short = (spans / 2**doublings)[:, None, None]
     along, identity = slopes * short, np.eye(slopes.shape[1])
     term, carried = power[:, None] * short, np.broadcast_to(identity, along.shape)

@@ -74,13 +74,13 @@ class LinearRecording:
     """One recording of a program at a point: the map from changes of the simulation to changes of the residuals."""
 
     def __init__(self, program: Program, index: int, point: Point) -> None:
-        self.item, self.cut = program.experiments[index], program.joined(index, point.theta)
+        self.item, self.cut = program.experiments[index], program.segments[index]
         self.index, self.nodes = index, point.nodes[index]
         self.states = self.nodes.shape[1]
         result = program.simulate(index, point, derivatives=True)
         assert result.dy is not None and result.dend is not None
         self.y, self.end = result.y, result.end
-        self.noise, self.loss = program.noise, program.loss
+        self.noise, self.loss, self.drive = program.noise, program.loss, program.drive
         self.seen = np.isfinite(self.item.measured)
         time = np.arange(self.item.grid.time.size)
         self.segment = self.cut.owner(time)
@@ -95,9 +95,6 @@ class LinearRecording:
         by_theta = result.dy[:, :, self.states :] @ self.slope * self.scaling[:, :, None]
         end_theta = result.dend[:-1, :, self.states :] @ self.slope
         columns = self._stack_columns(by_theta, end_theta, self._start_slopes(program, point))
-        if self.cut.gap_law is not None and self.cut.count > 1:
-            wider = program.gap_slopes(index, point.theta, self.end[:-1] - self.nodes[1:])
-            columns[self.seen.size :][: wider.shape[0] * self.states] += wider.reshape(-1, point.theta.size)
         direct = columns + self._measured_slopes(program, point)
         self.following = self._following(direct)
         self.jacobian = self._followed(direct, self.following)
@@ -106,9 +103,7 @@ class LinearRecording:
     def _start_slopes(self, program: Program, point: Point) -> FloatArray:
         if self.cut.start_weight is None:
             return np.zeros((0, self.states, point.theta.size))
-        tied = self.cut.tied
-        _, slopes = program.measured_states(self.item, point.theta, self.cut.first[tied])
-        return -self.cut.start_weight[tied][:, :, None] * slopes
+        return -self.cut.start_weight[self.cut.tied][:, :, None] * program.expected(self.index, point.theta)[1]
 
     def _measured_slopes(self, program: Program, point: Point) -> FloatArray:
         """Return (rows, parameters) what the parameters do through nodes that the measurement gives."""
@@ -207,7 +202,7 @@ class LinearRecording:
 
     def _factors(self, cut: Segments) -> tuple[FloatArray, FloatArray]:
         """Return (segments, states) scales of the nodes, and the Cholesky factors of their scaled normal matrix."""
-        count, states = cut.count, self.states
+        count, states, index = cut.count, self.states, np.arange(int(self.states))
         seen = np.where(self.seen[:, :, None], self.dy, 0.0)
         diagonal = np.add.reduceat(np.einsum("noi,noj->nij", seen, seen), cut.first[:-1], axis=0)
         upper = np.zeros((max(count - 1, 0), states, states))
@@ -217,9 +212,7 @@ class LinearRecording:
             diagonal[1:] += np.einsum("kji,kjl->kil", cut.gap_weight, cut.gap_weight)
             upper = -np.einsum("kji,kjl->kil", forward, cut.gap_weight)
         if cut.start_weight is not None:
-            for j in cut.tied:
-                diagonal[j] += np.diag(cut.start_weight[j] ** 2)
-        index = np.arange(int(states))
+            diagonal[:, index, index] += cut.start_weight**2
         diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
         scale = 1.0 / np.sqrt(diagonal[:, index, index])
         diagonal = diagonal * scale[:, :, None] * scale[:, None, :]

@@ -49,7 +49,7 @@ def gap_prices(item: LinearRecording, cut: Segments, wider: FloatArray) -> Float
     `cut` has these gaps. What the recording does not tell of its nodes is as open as the gaps leave it, at no cost:
     half the change of the log-determinant of the information about all nodes comes back, in equal parts.
     """
-    if not wider.size or cut.gap_law is not None:
+    if not wider.size or item.drive.noisy_inputs:
         return wider
     back = 0.5 * (item.nodes_told(cut) - item.nodes_told(item.cut))
     return wider + (back if np.isfinite(back) else 0.0) / wider.size
@@ -70,7 +70,7 @@ def _reweighed(
 ) -> tuple[Segments, FloatArray]:
     if cut.gap_weight is None or cut.count < 2:
         return cut, np.zeros(0)
-    if cut.gap_law is not None:
+    if foot.noisy_inputs:
         return cut, np.zeros(cut.count - 1)
     impulses = input_impulses(model, item, moving.numbers[item.name])
     roots = gap_roots(model, foot, item, cut.first, impulses, moving)

@@ -67,7 +67,8 @@ def _begun_at(known: FittedModel, model: Model, foot: Footing, theta: FloatArray
 
     Where that comes to less than what is known, from where the parameters say that segments begin, too.
     """
-    shapes = [(cut.count, len(model.drive.state_names)) for cut in foot.training(model).segments]
+    program = foot.training(model)
+    shapes = [(cut.count, len(program.drive.state_names)) for cut in program.segments]
     nodes = known.linear.point.nodes
     nodes = nodes if shapes == [one.shape for one in nodes] else None
     end = polished(model, foot, theta, nodes)

@@ -377,9 +377,9 @@ class Search:
         again = shapes(current, bench.clues, accepted)
         keys = [*places(current, meant), *again]
         found = crew.screened(keys)
-        hopeful = [item for item in found if item.gain >= HOPE * enough or item.key in again]
+        may_be, known = accepted or bench.standard.may_be_met, {item.key: item for item in found}
+        hopeful = [item for item in found if may_be and (item.gain >= HOPE * enough or item.key in again)]
         gap = power.significant(level) or (bool(meant.names) and significant(bench.slow, level))
-        known = {item.key: item for item in found}
         chosen = shortlist(hopeful, np.inf if gap else level / max(len(found), 1))
         chosen += displaced(self.rounds, known, chosen)
         if power.significant(level):

@@ -1,60 +1,88 @@
-"""Models that leave no more than noise, fitted to what channels show beyond the torque noise within a segment.
+"""Models that leave no more than noise, fitted with the noise of their measured inputs as unknowns.
 
-Where the noise of a measured current moves a fine encoder within two samples by more than the encoder's own noise, all
-samples between nodes are as blurred as that, and gaps are laid for one inertia. A model is then judged by how much it
-answers to noise that its machine does not answer to: a rotor that is stated rightly looks too light. With gaps that
-are each model's own, and samples at nodes alone, none is favoured. But what misses much would then make its gaps as
-wide as it likes: that is judged as before.
+Where the noise of a measured current moves a fine encoder within two samples by more than the encoder's own noise, a
+model is judged by how much it answers to noise that its machine does not answer to: gaps are laid for one inertia, and
+a rotor that is stated rightly looks too light. With the noise of every sample an unknown, none is favoured. But what
+misses much would call that noise: it is judged as before.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from friction_ocp.diagnosis.easing import along
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import Footing, cuts, within
+from friction_ocp.diagnosis.footing import Footing, within
 from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import innovations
+from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.torque_noise import SHORTEST, driving
 from friction_ocp.simulation.grid import FloatArray
 
-LEAST_KEPT = 0.3
-"""Share of the samples of a channel that lie at nodes, below which its other samples count too, as blurred as they
-are."""
+LATE = 0.01
+"""Share of a sampling interval by which a node may miss a sample."""
+MOST_SAMPLES = 30_000
+"""Samples of all recordings together up to which the noise of each is an unknown: more cost time."""
 
 
 def fitted_sharply(fitted: FittedModel, guesses: FloatArray) -> FittedModel:
     """Fit a model again on a sharpened footing; the same where there is none, or where more than noise is left there.
 
-    From where it stands, which noise has drawn away from the truth, and from the guesses.
+    From where it stands and, where that leaves more, from the guesses: noise may have drawn it far from the truth.
     """
     model, foot = fitted.model, sharpened(fitted.model, fitted.footing)
     if foot is fitted.footing or fitted.astray:
         return fitted
-    here = along(foot.training(model), fitted.linear.program, fitted.linear.point)
-    starts = [polished(model, foot, fitted.theta, here.nodes), polished(model, foot, guesses, None)]
-    found = min((freed(timed(start)) for start in starts), key=lambda end: end.objective)
-    return fitted if innovations(found).significant(level_of(model.problem)) else found
+    level, here = level_of(model.problem), along(foot.training(model), fitted.linear.program, fitted.linear.point)
+    for theta, nodes in ((fitted.theta, here.nodes), (guesses, None)):
+        found = freed(timed(polished(model, foot, theta, nodes)))
+        if not innovations(found).significant(level):
+            return found
+    return fitted
+
+
+def seen_on(foot: Footing, fitted: FittedModel) -> FittedModel:
+    """Return a model at its parameters on another footing, its nodes where they are best."""
+    program = foot.training(fitted.model)
+    point = solve_nodes(program, along(program, fitted.linear.program, fitted.linear.point))
+    return FittedModel(fitted.model, foot, linear_program(program, point))
 
 
 def sharpened(model: Model, foot: Footing) -> Footing:
-    """Return a footing on which what torque noise blurs between nodes no longer counts, and gaps are each model's own.
+    """Return a footing on which the noise of measured inputs is an unknown of every sample.
 
-    The same where it blurs no channel by more than that shows itself, where few samples lie at nodes, and where torque
-    noise is stated: that moves the machine.
+    The same where it moves no channel by more than that shows itself, where recordings are too long or not sampled as
+    their inputs are, and where torque noise is stated: that moves the machine.
     """
-    if foot.sharp or not foot.joined or foot.segment_s is None or model.problem.estimation.process_noise:
+    stated = bool(model.problem.estimation.process_noise)
+    if foot.noisy_inputs or not foot.joined or stated:
         return foot
-    item = model.train[0]
-    added, seen = within(model, foot, item, foot.segment_s), np.isfinite(item.measured)
-    kept = np.sum(seen[cuts(item, foot.segment_s)], axis=0) / np.maximum(np.sum(seen, axis=0), 1)
-    sharp = (added > model.noise**2) & (kept >= LEAST_KEPT)
-    if not np.any(sharp):
+    first = model.train[0]
+    if not np.any(within(model, foot, first, SHORTEST * float(np.median(first.grid.dt))) > model.noise**2):
         return foot
-    noise = np.sqrt(model.noise**2 + np.where(sharp, 0.0, added))
-    return replace(foot, noise=noise, sharp=tuple(map(bool, sharp)))
+    turning = driving(model.problem.drive, foot.numbers[model.train[0].name])
+    inputs = tuple(dict.fromkeys(channel.name for _, channel, _ in turning))
+    if sum(item.grid.time.size for item in foot.train) > MOST_SAMPLES or not _in_step(foot.train, model, inputs):
+        return foot
+    return replace(foot, noise=model.noise, noisy_inputs=inputs)
+
+
+def _in_step(items: Sequence[Experiment], model: Model, inputs: Sequence[str]) -> bool:
+    """Whether recordings have a node at every sample of some inputs, and at no other time."""
+    named = {use.name: use.recording for use in model.problem.recordings}
+    for item in items:
+        times, near = item.grid.time, LATE * float(np.median(item.grid.dt))
+        for name in inputs:
+            samples = named[item.name].channels[name].time
+            own = samples[(samples >= times[0] - near) & (samples <= times[-1] + near)]
+            if own.size != times.size or not np.allclose(own, times, rtol=0.0, atol=near):
+                return False
+    return True

@@ -67,6 +67,8 @@ class SteppedDrive:
     (arguments, torques) -> (value, torques found), before torques = torques found is solved: differentiating this
     is cheaper than differentiating Newton's method.
     """
+    noisy_inputs: tuple[str, ...] = ()
+    """Inputs whose noise is among the states (input_noise.py)."""
 
 
 @dataclass(frozen=True)

@@ -91,10 +91,7 @@ def _of_recording(
     if cut.gap_weight is not None and cut.count > 1:
         flat = program.gap_errors(index, point, result.end).ravel()
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
-        weight = program.joined(index, point.theta).gap_weight
-        assert weight is not None
-        moved = np.einsum("kij,kjp->kip", weight, moved + result.dend[:-1, :, states:] @ slope)
-        moved += program.gap_slopes(index, point.theta, result.end[:-1] - point.nodes[index][1:])
+        moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
         parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
     order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")

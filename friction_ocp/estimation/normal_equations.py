@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
+
+Batch = slice | IntArray
+"""Segments, none of them twice."""
 
 
 @dataclass
@@ -33,7 +36,7 @@ class NormalEquations:
             np.zeros(count),
         )
 
-    def add(self, batch: slice, jacobian: FloatArray, error: FloatArray, weight: FloatArray, slope: FloatArray) -> None:
+    def add(self, batch: Batch, jacobian: FloatArray, error: FloatArray, weight: FloatArray, slope: FloatArray) -> None:
         """Add rows of a batch of segments, each depending on its node and on the parameters.
 
         `jacobian` (segments, rows, states + k) by node and by k numbers that move with the parameters by `slope`
@@ -42,7 +45,7 @@ class NormalEquations:
         weighted = (jacobian * weight[:, :, None]).transpose(0, 2, 1)
         self.add_squares(batch, weighted @ jacobian, np.einsum("kij,kj->ki", weighted, error), slope)
 
-    def add_squares(self, batch: slice, square: FloatArray, gradient: FloatArray, slope: FloatArray) -> None:
+    def add_squares(self, batch: Batch, square: FloatArray, gradient: FloatArray, slope: FloatArray) -> None:
         """Add J'WJ (segments, states + k, states + k) and J'We (segments, states + k) of a batch of segments."""
         states = self.node_node.shape[1]
         self.node_node[batch] += square[:, :states, :states]

@@ -25,10 +25,6 @@ from friction_ocp.simulation.kernel import Score, SweepRequest, SweepResult, Yar
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 from friction_ocp.simulation.sweep import Sweep
 
-STEP = 1e-3
-"""Step over which the widths of gaps are differentiated, over the size of a parameter: they are smooth, and the rates
-of the motion behind them have few digits."""
-
 
 @dataclass(frozen=True)
 class Point:
@@ -155,12 +151,18 @@ class Program:
         return Point(point.theta, tuple(np.concatenate([start, own[len(start) :]]) for (start, _), own in pairs))
 
     def point_along(self, other: Program, at: Point) -> Point:
-        """Return the parameters of `at` with every node where the simulation of another program at `at` passes it."""
+        """Return the parameters of `at` with every node where the simulation of another program at `at` passes it.
+
+        States that this one has alone are zero: noise of inputs.
+        """
         nodes: list[FloatArray] = []
+        known = [name in self.drive.state_names for name in other.drive.state_names]
         for index, cut in enumerate(self.segments):
             track = other.simulate(index, at, with_states=True).states
             assert track is not None
-            nodes.append(track[cut.first[:-1]])
+            passed = np.zeros((cut.count, len(self.drive.state_names)))
+            passed[:, : int(np.sum(known))] = track[cut.first[:-1]][:, known]
+            nodes.append(passed)
         return Point(at.theta, tuple(nodes))
 
     def simulate(self, index: int, point: Point, derivatives: bool = False, with_states: bool = False) -> SweepResult:
@@ -268,29 +270,28 @@ class Program:
 
     def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
         """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
-        return self.joined(index, point.theta).weighed(end[:-1] - point.nodes[index][1:])
-
-    def joined(self, index: int, theta: FloatArray) -> Segments:
-        """Return the segments of a recording with the gaps that they have at some parameters."""
-        return self.segments[index].at(self.space.numbers(theta, self.experiments[index].name))
-
-    def gap_slopes(self, index: int, theta: FloatArray, gaps: FloatArray) -> FloatArray:
-        """Return (gaps, states, parameters) how gaps (gaps, states) over what is allowed change with that alone."""
-        law, scale = self.segments[index].gap_law, STEP * np.maximum(np.abs(theta), self.space.scale)
-        if law is None or not theta.size:
-            return np.zeros((*gaps.shape, theta.size))
-        numbers, slope = self.space.numbers_and_slope(theta, self.experiments[index].name)
-        moves = np.zeros((theta.size, numbers.size))
-        moves[:, list(self.space.active)] = (slope * scale).T
-        return law.changes(numbers, moves, gaps) / scale
+        return self.segments[index].weighed(end[:-1] - point.nodes[index][1:])
 
     def start_errors(self, index: int, point: Point) -> FloatArray:
         """Return (tied, states) how far tied nodes are from what was measured, over their deviations."""
         cut, nodes = self.segments[index], point.nodes[index]
         if cut.start_weight is None:
             return np.zeros((0, nodes.shape[1]))
-        suggested, _ = self.measured_states(self.experiments[index], point.theta, cut.first[cut.tied])
-        return cut.start_weight[cut.tied] * (nodes[cut.tied] - suggested)
+        return cut.start_weight[cut.tied] * (nodes[cut.tied] - self.expected(index, point.theta)[0])
+
+    def expected(self, index: int, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return (tied, states) what is known of tied nodes beforehand, and its derivatives (tied, states, parameters).
+
+        The motion as it was measured, and no noise of inputs.
+        """
+        cut, states = self.segments[index], len(self.drive.state_names)
+        value, slope = np.zeros((cut.tied.size, states)), np.zeros((cut.tied.size, states, theta.size))
+        if cut.start_weight is None:
+            return value, slope
+        moving = len(self.drive.mechanism.state_names)
+        shown = np.any(cut.start_weight[cut.tied, :moving] > 0, axis=1)
+        value[shown], slope[shown] = self.measured_states(self.experiments[index], theta, cut.first[cut.tied[shown]])
+        return value, slope
 
     def parameter_terms(self, theta: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return cost, Hessian and gradient of what hangs on the parameters alone: priors, static points, a tether."""
@@ -338,25 +339,21 @@ class Program:
         system = NormalEquations.empty(cut.count, states, count)
         system.cost += float(np.sum(score.cost))
         system.add_squares(slice(0, cut.count), score.square, score.gradient, slope)
-        self._add_gaps(index, point, result, slope, system)
+        self._add_gaps(cut, nodes, result, slope, system)
         self._add_start(index, point, start_slope, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
     def _add_gaps(
-        self, index: int, point: Point, result: SweepResult, slope: FloatArray, system: NormalEquations
+        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: NormalEquations
     ) -> None:
-        cut, nodes = self.joined(index, point.theta), point.nodes[index]
         if cut.gap_weight is None or cut.count < 2:
             return
         assert result.dend is not None
         weight, states = cut.gap_weight, nodes.shape[1]
         before, after = slice(0, cut.count - 1), slice(1, cut.count)
-        jumps = result.end[:-1] - nodes[1:]
-        gap, jacobian = cut.weighed(jumps), weight @ result.dend[:-1]
-        if cut.gap_law is not None and len(slope):
-            by_theta = jacobian[:, :, states:] @ slope + self.gap_slopes(index, point.theta, jumps)
-            jacobian, slope = np.concatenate([jacobian[:, :, :states], by_theta], axis=2), np.eye(point.theta.size)
+        gap = cut.weighed(result.end[:-1] - nodes[1:])
+        jacobian = weight @ result.dend[:-1]
         system.cost += 0.5 * float(np.sum(gap**2))
         system.add(before, jacobian, gap, np.ones(gap.shape), slope)
         back = weight.transpose(0, 2, 1)
@@ -366,18 +363,16 @@ class Program:
         system.node_gradient[after] -= np.einsum("kij,kj->ki", back, gap)
 
     def _add_start(self, index: int, point: Point, start_slope: FloatArray, system: NormalEquations) -> None:
-        cut, item = self.segments[index], self.experiments[index]
+        cut = self.segments[index]
         if cut.measured:
             system.fold_nodes(start_slope)
-        elif cut.start_weight is not None:
-            suggested, slopes = self.measured_states(item, point.theta, cut.first[cut.tied])
-            for j, expected, slope in zip(cut.tied, suggested, slopes, strict=True):
-                weight = np.diag(cut.start_weight[j])
-                error: FloatArray = cut.start_weight[j] * (point.nodes[index][j] - expected)
-                system.cost += 0.5 * float(error @ error)
-                jacobian = np.hstack([weight, -weight @ slope])[None]
-                same = np.eye(slope.shape[1])
-                system.add(slice(int(j), int(j) + 1), jacobian, error[None], np.ones((1, error.size)), same)
+        if cut.start_weight is not None:
+            weight = cut.start_weight[cut.tied]
+            expected, slopes = self.expected(index, point.theta)
+            error = weight * (point.nodes[index][cut.tied] - expected)
+            system.cost += 0.5 * float(np.sum(error**2))
+            jacobian = np.concatenate([weight[:, :, None] * np.eye(weight.shape[1]), -weight[:, :, None] * slopes], 2)
+            system.add(cut.tied, jacobian, error, np.ones(error.shape), np.eye(point.theta.size))
 
 
 def _prior_cost(space: ParameterSpace, theta: FloatArray) -> float:

@@ -2,28 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
 from friction_ocp.simulation.grid import FloatArray, IntArray
-
-
-class GapLaw(Protocol):
-    """How the weights of gaps hang on the numbers of the drive."""
-
-    def widened(self, factor: float) -> GapLaw:
-        """Return that of gaps that are wider."""
-        ...
-
-    def weights(self, numbers: FloatArray) -> FloatArray:
-        """Return (gaps, states, states) W with W'W the inverse covariance of each gap."""
-        ...
-
-    def changes(self, numbers: FloatArray, moves: FloatArray, gaps: FloatArray) -> FloatArray:
-        """Return (gaps, states, moves) how weighed `gaps` (gaps, states) change with `moves` (moves, numbers)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -39,8 +22,6 @@ class Segments:
     """How many nodes, from the first, are no variables but what the smoothed measurement says."""
     start_weight: FloatArray | None = None
     """(segments, states) 1 / standard deviation of the prior on each node, about what the smoothed measurement says."""
-    gap_law: GapLaw | None = None
-    """How the weights of the gaps hang on the numbers of the drive; None where they do not."""
 
     @property
     def count(self) -> int:
@@ -57,17 +38,6 @@ class Segments:
         if self.start_weight is None:
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(np.any(self.start_weight > 0, axis=1))
-
-    def at(self, numbers: FloatArray) -> Segments:
-        """Return them with the gaps that they have at numbers of the drive."""
-        return self if self.gap_law is None else replace(self, gap_weight=self.gap_law.weights(numbers))
-
-    def widened(self, factor: float) -> Segments:
-        """Return them with gaps that are wider by a factor."""
-        if self.gap_weight is None:
-            return self
-        law = None if self.gap_law is None else self.gap_law.widened(factor)
-        return replace(self, gap_weight=self.gap_weight / factor, gap_law=law)
 
     def weighed(self, gaps: FloatArray) -> FloatArray:
         """Return gaps (segments - 1, states) over what is allowed; none where the segments are unconnected."""

@@ -10,6 +10,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from friction_ocp.drive.input_noise import with_input_noise
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.execution.effort import count
@@ -87,9 +88,9 @@ class Sweep:
 
 
 @kept(64)
-def sweep_of(drive: Drive, active: tuple[int, ...], values_only: bool = False) -> Sweep:
-    """Return the sweep of a drive; the last ones are kept."""
-    return Sweep(stepped(drive), active, values_only)
+def sweep_of(drive: Drive, active: tuple[int, ...], values_only: bool = False, noisy: tuple[str, ...] = ()) -> Sweep:
+    """Return the sweep of a drive, with the noise of `noisy` inputs as states; the last ones are kept."""
+    return Sweep(with_input_noise(stepped(drive), noisy), active, values_only)
 
 
 def worker_count() -> int:

@@ -20,7 +20,7 @@ from friction_ocp.recording.recording import Channel, Recording
 
 STEP, SECONDS, TORQUE_CONSTANT = 2e-3, 3.0, 0.35
 MOTOR_INERTIA = 2e-3
-UNITS = {"current": "A", "position": "rad", "speed": "rad/s", "vibration": "rad/s^2"}
+UNITS = {"current": "A", "position": "rad", "speed": "rad/s", "vibration": "rad/s^2", "load_position": "rad"}
 
 
 def current(k: int) -> Trajectory:

@@ -123,6 +123,25 @@ def test_what_torque_noise_does_to_free_runs_is_no_evidence_against(
 
 
 @pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(("drift", "material"), [(0.0, True), (1e3, False)])
+def test_what_torque_noise_does_to_free_runs_is_no_evidence_for(drift: float, material: bool) -> None:
+    """For an addition: there free runs come closer by chance."""
+    before, then = drifting(50.0, 0.0, 1, drift=drift), drifting(5.0, 0.0, 2, drift=drift)
+    assert Standard(before).is_material(then) is material
+
+
+@pytest.mark.usefixtures("looked_at")
+@pytest.mark.parametrize(
+    ("power", "beyond", "drift", "met"),
+    [(50.0, 0.0, 0.0, True), (50.0, 0.0, 1e3, False), (50.0, 0.3, 1e3, True), (0.5, 0.0, 0.0, False)],
+)
+def test_where_nothing_is_left_no_addition_can_take_it_away(
+    power: float, beyond: float, drift: float, met: bool
+) -> None:
+    assert Standard(drifting(power, beyond, 1, drift=drift)).may_be_met is met
+
+
+@pytest.mark.usefixtures("looked_at")
 @pytest.mark.parametrize(
     ("before", "after", "left", "material"),
     [(4e12, 4e13, 3.5, True), (4e11, 4e12, 3.5, False), (4e12, 4e13, 4.0, False)],

@@ -1,7 +1,8 @@
-"""Gaps that the noise of a measured torque makes, as wide as each model makes them."""
+"""Noise of measured inputs as unknowns of every sample."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ from test_relaid_gaps import MOTOR_INERTIA, TORQUE_CONSTANT, written
 
 from friction_ocp.diagnosis import base_fit
 from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import footing
-from friction_ocp.diagnosis.gathered_noise import sampled_covariances
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.sharpening import sharpened
+from friction_ocp.diagnosis.polishing import begun
+from friction_ocp.diagnosis.sharpening import seen_on, sharpened
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.program import Point, Program
@@ -47,14 +49,21 @@ def swings(k: int) -> Trajectory:
     return Trajectory(time, 0.9 * np.sum(waves, axis=0), "linear")
 
 
-def write(folder: Path) -> Path:
-    """Write runs of a motor and a load that hangs on a gear, seen by a noisy current and a fine encoder."""
+def write(folder: Path, both: bool = False) -> Path:
+    """Write runs of a motor and a load that hangs on a gear, seen by a noisy current and a fine encoder, or `both`."""
     motor = PlantShaft("axis", MOTOR_INERTIA, PlantFriction("coulomb_viscous", tau_c=0.1, viscous=1.5e-3))
     load = PlantShaft("load", 0.05, PlantFriction("coulomb_viscous", tau_c=0.1, viscous=0.02), gravity=(1.0, 0.0))
-    sensors = (
+    sensors: tuple[PlantSensor, ...] = (
         PlantSensor("current", "motor.current", STEP, noise_std=NOISE),
         PlantSensor("position", "axis.theta", STEP, resolution=RESOLUTION),
     )
+    channels: dict[str, Any] = {
+        "current": {"measures": "motor.current", "role": "input"},
+        "position": {"measures": "axis.theta", "resolution": RESOLUTION},
+    }
+    if both:
+        sensors += (PlantSensor("load_position", "load.theta", STEP, resolution=RESOLUTION / 5.0),)
+        channels["load_position"] = {"measures": "load.theta", "resolution": RESOLUTION / 5.0}
     drive = PlantMotor("motor", "axis", torque_constant=TORQUE_CONSTANT)
     plant = Plant((motor, load), (PlantTransmission("axis", "load", 5.0, 800.0, 0.2),), (drive,), sensors=sensors)
     changes: dict[str, Any] = {
@@ -64,10 +73,7 @@ def write(folder: Path) -> Path:
             "gravity": {"torque": {"guess": 0.9, "min": 0, "max": 5}},
         },
         "joint": {"stiffness": {"guess": 744.0, "min": 10, "max": 1e5}},
-        "channels": {
-            "current": {"measures": "motor.current", "role": "input"},
-            "position": {"measures": "axis.theta", "resolution": RESOLUTION},
-        },
+        "channels": channels,
     }
     return written(folder, plant, SECONDS, swings, changes)
 
@@ -85,53 +91,51 @@ def model(path: Path) -> Model:
 
 @pytest.fixture(scope="module")
 def program(model: Model) -> Program:
-    """Its likelihood with gaps that are each model's own, laid at the truth."""
+    """Its likelihood with the noise of its current as an unknown of every sample, laid at the truth."""
     foot = sharpened(model, footing(model, model.space.with_known(TRUTH)))
-    assert foot.sharp == (True,)
+    assert foot.noisy_inputs == ("current",)
     return foot.training(model)
 
 
-def test_only_samples_at_nodes_count(program: Program) -> None:
-    for item, cut in zip(program.experiments, program.segments, strict=True):
-        seen = np.isfinite(item.measured)
-        assert np.all(seen[cut.first[:-1]])
-        assert np.sum(seen) == seen.shape[1] * cut.count
+def test_the_truth_leaves_as_much_as_noise_does(model: Model, program: Program) -> None:
+    """Every sample of the encoder tells one of the noises of the current; what is left has the power of all of them."""
+    truth = begun(program, model.space.with_known(TRUTH))
+    chance = 5.0 * np.sqrt(2.0 / program.samples)
+    assert 2.0 * program.objective(truth) / program.samples == pytest.approx(1.0, abs=chance)
+    noise = program.drive.state_names.index("current.noise")
+    found = np.concatenate([nodes[:, noise] for nodes in truth.nodes])
+    assert np.std(found) == pytest.approx(NOISE, rel=0.05)
 
 
-def test_gaps_of_a_free_rotor_are_those_of_independent_samples(model: Model) -> None:
-    """Two samples of unit density, each held for a step: the speeds add up, and the angle gathers the first one's."""
-    step, states = 0.1, model.state_scale.size
-    slopes = np.zeros((1, states, states))
-    slopes[0, 0, 2] = 1.0
-    found = sampled_covariances(model, slopes, np.array([2.0 * step]), step)[0, 0]
-    power = 1.0 / step
-    assert found[2, 2] == pytest.approx(2.0 * power * step**2)
-    assert found[0, 0] == pytest.approx(power * (1.5**2 + 0.5**2) * step**4)
-    assert found[0, 2] == pytest.approx(power * (1.5 + 0.5) * step**3)
+def test_lines_join_the_noise_of_neighbours(model: Model, program: Program) -> None:
+    truth = begun(program, model.space.with_known(TRUTH))
+    noise, rate = (program.drive.state_names.index(f"current.{kind}") for kind in ("noise", "noise_rate"))
+    nodes, spans = truth.nodes[0], np.diff(program.experiments[0].grid.time)
+    assert np.allclose(nodes[:-1, noise] + spans[:-1] * nodes[:-1, rate], nodes[1:, noise], atol=0.01 * NOISE)
 
 
-def test_what_follows_a_torque_at_once_is_moved_by_no_more_than_its_noise(model: Model) -> None:
-    """The speed of a rotor that a damper holds at once is the torque over the damping."""
-    step, states, rate = 0.1, model.state_scale.size, 1e4
-    slopes = np.zeros((1, states, states))
-    slopes[0, 2, 2] = -rate
-    found = sampled_covariances(model, slopes, np.array([2.0 * step]), step)[0, 0, 2, 2]
-    assert found == pytest.approx(1.0 / step / rate**2, rel=1e-3)
-
-
-def test_gaps_are_as_wide_as_the_torque_moves_each_rotor(model: Model, program: Program) -> None:
-    """A free rotor of half the inertia is moved twice as far, by the noise of the current; the gear holds it back."""
+def test_a_model_is_seen_on_the_sharpened_footing_where_it_stands(model: Model, program: Program) -> None:
+    """At its parameters, its nodes where they are best: as far from the recordings as noise is, at the truth."""
     theta = model.space.with_known(TRUTH)
-    light = theta * np.where(np.array(model.space.names) == "axis.inertia", 0.5, 1.0)
-    speed = model.drive.state_names.index("axis.omega")
-    widths: list[float] = []
-    for at in (theta, light):
-        weight = program.joined(0, at).gap_weight
-        assert weight is not None
-        widths.append(float(np.sqrt(np.linalg.inv(weight[100].T @ weight[100])[speed, speed])))
-    step = float(program.experiments[0].grid.dt[0])
-    assert 0.5 < widths[0] / (np.sqrt(2.0) * NOISE * TORQUE_CONSTANT * step / MOTOR_INERTIA) < 1.0
-    assert 1.4 < widths[1] / widths[0] < 2.0
+    foot = footing(model, theta)
+    plain = foot.training(model)
+    fitted = FittedModel(model, foot, linear_program(plain, begun(plain, theta)))
+    seen = seen_on(sharpened(model, foot), fitted)
+    assert np.array_equal(seen.theta, theta)
+    assert seen.linear.point.nodes[0].shape == (program.segments[0].count, len(program.drive.state_names))
+    assert seen.objective == pytest.approx(0.5 * program.samples, rel=0.1)
+
+
+def test_noise_of_inputs_that_are_sampled_otherwise_is_that_of_torque(path: Path) -> None:
+    """There is no unknown for every node where an input has samples at every second one alone."""
+    problem = load_problem(path)
+    use, *others = problem.train
+    current = use.recording.channels["current"]
+    halved = replace(current, time=current.time[::2], values=current.values[::2])
+    recording = replace(use.recording, channels={**use.recording.channels, "current": halved})
+    model = prepare(replace(problem, train=(replace(use, recording=recording), *others)))
+    foot = footing(model, model.space.with_known(TRUTH))
+    assert sharpened(model, foot) is foot
 
 
 def test_slopes_are_those_of_the_objective(model: Model, program: Program) -> None:
@@ -162,9 +166,9 @@ def _slopes(model: Model, program: Program, at: Point) -> FloatArray:
 def test_a_stated_inertia_that_is_right_is_found_again(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Gaps laid for one inertia favour a rotor that answers less to noise, far beyond what its prior allows."""
     fitted = fit_base(model)
-    assert fitted.footing.sharp
+    assert fitted.footing.noisy_inputs
     assert fitted.values["axis.inertia"] == pytest.approx(MOTOR_INERTIA, rel=0.1)
-    assert 0.4 < fitted.objective / (0.5 * fitted.linear.program.samples) < 1.3
+    assert 0.9 < fitted.objective / (0.5 * fitted.linear.program.samples) < 1.1
     monkeypatch.setattr(base_fit, "fitted_sharply", lambda fitted, guesses: fitted)
     assert fit_base(model).values["axis.inertia"] > (1.0 + 2.0 * STATED) * MOTOR_INERTIA
 
@@ -172,4 +176,11 @@ def test_a_stated_inertia_that_is_right_is_found_again(model: Model, monkeypatch
 @pytest.mark.slow
 def test_a_noisy_current_is_no_wrong_inertia(path: Path) -> None:
     result: dict[str, Any] = diagnosed(path)
+    assert result["verdict"] == "no_gap" and not result["accepted"]
+
+
+@pytest.mark.slow
+def test_two_encoders_see_no_eccentricity_in_it(tmp_path: Path) -> None:
+    """A sample bears on the segments on either side of it, which two encoders see."""
+    result: dict[str, Any] = diagnosed(write(tmp_path, both=True))
     assert result["verdict"] == "no_gap" and not result["accepted"]
