@@ -36,14 +36,15 @@ MOST_SAMPLES = 30_000
 def fitted_sharply(fitted: FittedModel, guesses: FloatArray) -> FittedModel:
     """Fit a model again on a sharpened footing; the same where there is none, or where more than noise is left there.
 
-    From where it stands and, where that leaves more, from the guesses: noise may have drawn it far from the truth.
+    From where it stands, which noise may have drawn far from the truth, and from the guesses: the better end first.
     """
     model, foot = fitted.model, sharpened(fitted.model, fitted.footing)
     if foot is fitted.footing or fitted.astray:
         return fitted
     level, here = level_of(model.problem), along(foot.training(model), fitted.linear.program, fitted.linear.point)
-    for theta, nodes in ((fitted.theta, here.nodes), (guesses, None)):
-        found = freed(timed(polished(model, foot, theta, nodes)))
+    ends = [polished(model, foot, fitted.theta, here.nodes), polished(model, foot, guesses, None)]
+    for end in sorted(ends, key=lambda end: end.objective):
+        found = freed(timed(end))
         if not innovations(found).significant(level):
             return found
     return fitted
