@@ -30,7 +30,6 @@ def with_input_noise(drive: SteppedDrive, inputs: tuple[str, ...]) -> SteppedDri
     """
     if not inputs:
         return drive
-    known = len(drive.state_names)
     holds = {channel.name: channel.hold for channel in drive.mechanism.drive.inputs}
     lines = tuple(name for name in inputs if holds[name] == "linear")
     columns = [drive.input_names.index(name) for name in inputs]
@@ -54,7 +53,6 @@ def with_input_noise(drive: SteppedDrive, inputs: tuple[str, ...]) -> SteppedDri
     arguments = [ca.SX.sym(f"a{k}", drive.start.size1_in(k)) for k in range(drive.start.n_in())]
     start = ca.vertcat(drive.start.call(arguments, True, False)[0], ca.SX.zeros(len(inputs) + len(lines)))
     further = (*(name + NOISE for name in inputs), *(name + RATE for name in lines))
-    assert not known or drive.step.size1_out(0) == known
     return replace(
         drive,
         state_names=(*drive.state_names, *further),
