@@ -15,7 +15,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.easing import along
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import Footing, within
+from friction_ocp.diagnosis.footing import Footing, group_density, within
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
@@ -24,7 +24,8 @@ from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
-from friction_ocp.estimation.torque_noise import SHORTEST, driving
+from friction_ocp.estimation.torque_noise import SHORTEST, driving, seen_variance
+from friction_ocp.parameters import is_off
 from friction_ocp.simulation.grid import FloatArray
 
 LATE = 0.01
@@ -36,18 +37,15 @@ MOST_SAMPLES = 30_000
 def fitted_sharply(fitted: FittedModel, guesses: FloatArray) -> FittedModel:
     """Fit a model again on a sharpened footing; the same where there is none, or where more than noise is left there.
 
-    From where it stands, which noise may have drawn far from the truth, and from the guesses: the better end first.
+    From where it stands, which noise may have drawn far from the truth, and from the guesses.
     """
     model, foot = fitted.model, sharpened(fitted.model, fitted.footing)
     if foot is fitted.footing or fitted.astray:
         return fitted
-    level, here = level_of(model.problem), along(foot.training(model), fitted.linear.program, fitted.linear.point)
-    ends = [polished(model, foot, fitted.theta, here.nodes), polished(model, foot, guesses, None)]
-    for end in sorted(ends, key=lambda end: end.objective):
-        found = freed(timed(end))
-        if not innovations(found).significant(level):
-            return found
-    return fitted
+    here = along(foot.training(model), fitted.linear.program, fitted.linear.point)
+    starts = [polished(model, foot, fitted.theta, here.nodes), polished(model, foot, guesses, None)]
+    found = min((freed(timed(start)) for start in starts), key=lambda end: end.objective)
+    return fitted if innovations(found).significant(level_of(model.problem)) else found
 
 
 def seen_on(foot: Footing, fitted: FittedModel) -> FittedModel:
@@ -73,7 +71,25 @@ def sharpened(model: Model, foot: Footing) -> Footing:
     inputs = tuple(dict.fromkeys(channel.name for _, channel, _ in turning))
     if sum(item.grid.time.size for item in foot.train) > MOST_SAMPLES or not _in_step(foot.train, model, inputs):
         return foot
-    return replace(foot, noise=model.noise, noisy_inputs=inputs)
+    blurred = np.sqrt(model.noise**2 + _late(model, foot, first))
+    return replace(foot, noise=blurred, noisy_inputs=inputs)
+
+
+def _late(model: Model, foot: Footing, item: Experiment) -> FloatArray:
+    """Return (outputs,) the variance of what delays of half a sample leave out of the noise that moves a channel.
+
+    They are expanded about the nearest sample to as many derivatives of the motion as are known: not to the rate of
+    an acceleration, which with noise that runs in lines changes by sqrt(2) of its deviation a sample.
+    """
+    mech, step = model.drive.mechanism, float(np.median(item.grid.dt))
+    rate = np.sqrt(2.0) * group_density(model, foot, item.name) / step**1.5
+    unknown = np.zeros((1, len(mech.state_names), len(mech.state_names)))
+    for k, group in enumerate(mech.angle_groups):
+        unknown[0, k, k] = (rate[group] * (0.5 * step) ** 3 / 6.0) ** 2
+    for k, group in enumerate(mech.free_groups, len(mech.angle_groups)):
+        unknown[0, k, k] = (rate[group] * (0.5 * step) ** 2 / 2.0) ** 2
+    late = np.array([not is_off(channel.delay) or bool(channel.clock) for channel in model.problem.drive.outputs])
+    return np.where(late, seen_variance(mech, foot.numbers[item.name], unknown), 0.0)
 
 
 def _in_step(items: Sequence[Experiment], model: Model, inputs: Sequence[str]) -> bool:

@@ -129,6 +129,11 @@ class Standard:
     def _before(self) -> FreeErrors:
         return free_errors(self.current, held_out=False)
 
+    @property
+    def _nothing_in_runs(self) -> bool:
+        """Whether free runs show less than noise may do to them, and the samples between which it acts show more."""
+        return bool(self.current.footing.noisy_inputs) and self._before.drowned
+
     @cached_property
     def _beyond(self) -> float:
         return innovations(self.current).beyond
@@ -140,7 +145,7 @@ class Standard:
             return self._beyond > MATERIAL
         if _static_excess(self.current) > MATERIAL:
             return True
-        return not self._before.drowned and self._before.excess() > MATERIAL
+        return not self._nothing_in_runs and self._before.excess() > MATERIAL
 
     def is_material(self, fitted: FittedModel) -> bool:
         """Whether an addition takes away more than the floors are in doubt by: of free runs, or of static points.
@@ -153,8 +158,9 @@ class Standard:
         them is left, they have to get worse for certain: runs that drift may do so by chance. Where almost all of them
         goes and not all, it is what else is missing that moves the runs. For the same reason they have to get better
         for certain, and by most of what they show, where nothing is missing from sample to sample and no slow torque
-        either. What torque noise alone may do to free runs does not speak against an addition, nor for one. Where
-        models are compared by short predictions free runs go astray whatever is added, and are not asked.
+        either. What torque noise alone may do to free runs does not speak against an addition, nor for one where its
+        every sample is an unknown. Where models are compared by short predictions free runs go astray whatever is
+        added, and are not asked.
         """
         one_step = (self._beyond, innovations(fitted).beyond)
         most = one_step[1] <= (1.0 - OF_REST) * one_step[0]
@@ -163,7 +169,7 @@ class Standard:
         before, after = self._before, free_errors(fitted, held_out=False)
         seed, pairs = fitted.model.problem.estimation.seed, [(_static_excess(self.current), _static_excess(fitted))]
         all_of_it = comes_closer(before, after, seed) and after.excess() <= (1.0 - ALONE) * before.excess()
-        if not before.drowned and (not self.silent or one_step[0] > DOUBTED - 1.0 or all_of_it):
+        if not self._nothing_in_runs and (not self.silent or one_step[0] > DOUBTED - 1.0 or all_of_it):
             pairs.append((before.excess(), after.excess()))
         if after.drowned:
             told = most
