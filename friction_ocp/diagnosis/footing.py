@@ -14,7 +14,6 @@ from friction_ocp.diagnosis.excerpts import cut_out, excerpts
 from friction_ocp.diagnosis.gathered_noise import alike, motions_of, slopes_about, unit_covariances
 from friction_ocp.diagnosis.noisy_nodes import sampled, with_noise
 from friction_ocp.diagnosis.standstill import without_jumps
-from friction_ocp.drive.input_noise import with_input_noise
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
@@ -98,7 +97,10 @@ class Footing:
         width, drive, sweep = 0.0 * model.speed_scale, model.drive, model.sweep
         if self.noisy_inputs:
             sweep = sweep_of(model.problem.drive, sweep.active, noisy=self.noisy_inputs)
-            drive = sweep.drive
+            drive, inputs = sweep.drive, model.problem.drive.inputs
+            known = {item.name: input_noise(model, item)[0] for item in inputs if item.name in self.noisy_inputs}
+            pairs = zip(experiments, segments, strict=True)
+            segments = tuple(with_noise(drive, item, cut, known) for item, cut in pairs)
         return Program(model.space, drive, sweep, experiments, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
@@ -124,13 +126,9 @@ class Footing:
         start[0] = start_weight(model, item)
         quiet = replace(self, density={}) if self.noisy_inputs else None
         weights = gap_roots(model, self, item, first, impulses, quiet)
-        measured = model.problem.estimation.initial_state == "measured"
-        found = Segments(first, weights, 1) if measured else Segments(first, weights, start_weight=start)
-        return self._with_noise(model, item, found) if self.noisy_inputs else found
-
-    def _with_noise(self, model: Model, item: Experiment, segments: Segments) -> Segments:
-        known = {channel.name: input_noise(model, channel)[0] for channel in model.problem.drive.inputs}
-        return with_noise(with_input_noise(model.drive, self.noisy_inputs), item, segments, known)
+        if model.problem.estimation.initial_state == "measured":
+            return Segments(first, weights, measured=1)
+        return Segments(first, weights, start_weight=start)
 
 
 def cuts(item: Experiment, seconds: float | None) -> IntArray:
@@ -246,18 +244,13 @@ def _jump_power(
     """Return (groups, segments) the power density of acceleration that jumps of inputs may hide."""
     mech = model.drive.mechanism
     inertias = group_inertias(mech, _known_numbers(model, foot, item.name))
-    power = np.zeros((len(inertias), len(first) - 1))
-    for shaft, density in _jumps_between(item, first, impulses).items():
+    spans = np.diff(item.grid.time[first])
+    power = np.zeros((len(inertias), spans.size))
+    for shaft, values in impulses.items():
         group = mech.topology.group_of[shaft]
         ratio = speed_ratio(mech, foot.numbers[item.name], shaft) / max(float(inertias[group]), 1e-300)
-        power[group] += density * ratio**2
+        power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
     return power
-
-
-def _jumps_between(item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return by shaft (segments,) the power density, (N m)^2/Hz, of torque that jumps of inputs may hide."""
-    spans = np.diff(item.grid.time[first])
-    return {shaft: np.add.reduceat(each**2, first[:-1]) / spans for shaft, each in impulses.items()}
 
 
 def _leaf_numbers(model: Model, foot: Footing, recording: str) -> FloatArray:

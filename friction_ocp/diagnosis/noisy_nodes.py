@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from friction_ocp.drive.input_noise import noise_states
+from friction_ocp.drive.input_noise import RATE, noise_states
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.segments import Segments
@@ -36,7 +36,7 @@ def with_noise(drive: SteppedDrive, item: Experiment, segments: Segments, deviat
     count, known, states = segments.count, segments.gap_weight.shape[1], len(drive.state_names)
     std = np.array([deviation[name] for name in drive.noisy_inputs])
     step = float(np.median(np.diff(item.grid.time)))
-    rising = np.array([f"{name}.noise_rate" in drive.state_names for name in drive.noisy_inputs])
+    rising = np.array([name + RATE in drive.state_names for name in drive.noisy_inputs])
     gaps = np.zeros((count - 1, states, states))
     gaps[:, :known, :known] = segments.gap_weight
     gaps[:, noise, noise] = 1.0 / (np.where(rising, EXACT, FREE) * std)

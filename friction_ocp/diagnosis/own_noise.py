@@ -37,6 +37,8 @@ def with_own_noise(
     By recording (gaps,) the logarithm of how much wider they may be: half the change of the log-determinant of their
     covariance.
     """
+    if foot.noisy_inputs:  # its gaps hold no torque noise
+        return program, tuple(np.zeros(cut.count - 1) for cut in program.segments)
     moving = moved_by_own(foot, model, theta)
     pairs = zip(program.experiments, program.segments, strict=True)
     found = [_reweighed(model, foot, moving, item, cut) for item, cut in pairs]
@@ -49,7 +51,7 @@ def gap_prices(item: LinearRecording, cut: Segments, wider: FloatArray) -> Float
     `cut` has these gaps. What the recording does not tell of its nodes is as open as the gaps leave it, at no cost:
     half the change of the log-determinant of the information about all nodes comes back, in equal parts.
     """
-    if not wider.size or item.drive.noisy_inputs:
+    if not wider.size:
         return wider
     back = 0.5 * (item.nodes_told(cut) - item.nodes_told(item.cut))
     return wider + (back if np.isfinite(back) else 0.0) / wider.size
@@ -70,8 +72,6 @@ def _reweighed(
 ) -> tuple[Segments, FloatArray]:
     if cut.gap_weight is None or cut.count < 2:
         return cut, np.zeros(0)
-    if foot.noisy_inputs:
-        return cut, np.zeros(cut.count - 1)
     impulses = input_impulses(model, item, moving.numbers[item.name])
     roots = gap_roots(model, foot, item, cut.first, impulses, moving)
     wider = np.linalg.slogdet(cut.gap_weight)[1] - np.linalg.slogdet(roots)[1]

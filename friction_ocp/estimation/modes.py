@@ -76,11 +76,11 @@ def slopes_at(
 
     Nor with its fall beyond standstill, which is infinitely steep there for exponents below 1: what rests sticks.
     """
-    slope = slope_function(drive, inputs)
+    slope = _slope_function(drive, inputs)
     return [np.asarray(slope(each, numbers)) for each in at]
 
 
-def slope_function(drive: SteppedDrive, inputs: list[float]) -> ca.Function:
+def _slope_function(drive: SteppedDrive, inputs: list[float]) -> ca.Function:
     """Return (states, numbers) -> (states, states) what `slopes_at` gives."""
     tiny, states = 1e-6, len(drive.state_names)
     x, numbers = ca.SX.sym("x", states), ca.SX.sym("numbers", len(drive.parameter_names))

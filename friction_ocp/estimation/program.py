@@ -153,15 +153,14 @@ class Program:
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it.
 
-        States that this one has alone are zero: noise of inputs.
+        States that this one has beyond those of the other are zero: noise of inputs.
         """
         nodes: list[FloatArray] = []
-        known = [name in self.drive.state_names for name in other.drive.state_names]
         for index, cut in enumerate(self.segments):
             track = other.simulate(index, at, with_states=True).states
             assert track is not None
             passed = np.zeros((cut.count, len(self.drive.state_names)))
-            passed[:, : int(np.sum(known))] = track[cut.first[:-1]][:, known]
+            passed[:, : track.shape[1]] = track[cut.first[:-1]]
             nodes.append(passed)
         return Point(at.theta, tuple(nodes))
 
