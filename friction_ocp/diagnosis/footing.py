@@ -101,12 +101,16 @@ class Footing:
             known = {item.name: input_noise(model, item)[0] for item in inputs if item.name in self.noisy_inputs}
             pairs = zip(experiments, segments, strict=True)
             segments = tuple(with_noise(drive, item, cut, known) for item, cut in pairs)
+            experiments = tuple(item.told_once() for item in experiments)
         return Program(model.space, drive, sweep, experiments, segments, self.noise, width, self.loss)
 
     def training(self, model: Model) -> Program:
         """Return the likelihood of training recordings and static points; the grids are those of the model."""
-        regridded = tuple(self._regridded(item, model) for item in self.train)
-        return replace(self.program(model, regridded), static=model.static)
+        return replace(self.program(model, self.training_items(model)), static=model.static)
+
+    def training_items(self, model: Model) -> tuple[Experiment, ...]:
+        """Return the training recordings with the inputs and the steps of a model."""
+        return tuple(self._regridded(item, model) for item in self.train)
 
     def _regridded(self, item: Experiment, model: Model) -> Experiment:
         stepped = replace(item, grid=item.grid.with_step(model.max_step))

@@ -81,7 +81,8 @@ def left_out_errors(fitted: FittedModel, known: Sequence[FloatArray] | None = No
 
     These may be `known`, by fold.
     """
-    groups, items, runs = folds(fitted), fitted.linear.program.experiments, list[FreeRun]()
+    groups, items = folds(fitted), fitted.footing.training_items(fitted.model)
+    runs = list[FreeRun]()
     thetas = [fitted_without(fitted, group) for group in groups] if known is None else known
     for group, theta in zip(groups, thetas, strict=True):
         runs += simulate_recordings(fitted.model, tuple(items[k] for k in group), theta)

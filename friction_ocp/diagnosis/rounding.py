@@ -8,9 +8,9 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import LinearRecording
-from friction_ocp.drive.parts import Channel
-from friction_ocp.recording.conditioning import detect_resolution
-from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+from friction_ocp.estimation.noise import step_of
+from friction_ocp.recording.repeats import is_stay
+from friction_ocp.simulation.grid import FloatArray, IntArray
 
 WAVES = 12
 """Waves of the rounding error over one count that are looked at; they hold 95 % of its power."""
@@ -89,18 +89,13 @@ def rounding_of(fitted: FittedModel) -> Rounding:
             own = own[item.seen[rows.node[own], channel]]
             values = item.item.measured[rows.node[own], channel]
             number = np.concatenate(([0], np.cumsum(np.diff(values) != 0.0)))[: own.size]
-            long = _is_stay(values)[number]
+            long = is_stay(values)[number]
             stays[own[long]] = count + number[long]
             count += int(own.size)
             step = step_of(fitted.model.problem.drive.outputs[channel], values)
             if step is not None:
                 counters.append(_counter(item, channel, step, own[~long], rows.node[own[~long]]))
     return Rounding(stays, tuple(counters))
-
-
-def step_of(channel: Channel, values: FloatArray) -> float | None:
-    """Return the step of a channel, as stated or as its values show it."""
-    return detect_resolution(values) if channel.resolution is None else channel.resolution
 
 
 def _counter(item: LinearRecording, channel: int, step: float, rows: IntArray, nodes: IntArray) -> Counter:
@@ -132,21 +127,3 @@ def _positive(change: FloatArray, known: FloatArray) -> FloatArray:
     sizes, turns = np.linalg.eigh(back.T @ change @ back)
     lifted = root @ turns
     return (lifted * np.maximum(sizes, 0.0)) @ lifted.T
-
-
-def _is_stay(values: FloatArray) -> BoolArray:
-    """Return (runs of equal values,) which are not just passed through.
-
-    A count that a drive passes at a steady speed errs by as much on the way in as on the way out, which adds up to
-    nothing. Where it turns back, or dwells for longer than at the counts beside, that is not so.
-    """
-    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
-    lengths = np.diff(np.concatenate(([0], edges, [values.size])))
-    if lengths.size < 3:
-        return lengths > 1
-    level = values[np.concatenate(([0], edges))]
-    passed = np.zeros(lengths.size, dtype=bool)
-    passed[1:-1] = (level[1:-1] - level[:-2]) * (level[2:] - level[1:-1]) > 0
-    beside = np.zeros(lengths.size)
-    beside[1:-1] = np.maximum(lengths[:-2], lengths[2:])
-    return (lengths > 1) & ~(passed & (lengths <= 2 * beside))

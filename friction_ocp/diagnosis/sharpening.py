@@ -16,7 +16,7 @@ import numpy as np
 from friction_ocp.diagnosis.easing import along
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, group_density, within
-from friction_ocp.diagnosis.kinks import freed
+from friction_ocp.diagnosis.kinks import freed, loosened
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
 from friction_ocp.diagnosis.polishing import polished, timed
@@ -44,7 +44,7 @@ def fitted_sharply(fitted: FittedModel, guesses: FloatArray) -> FittedModel:
         return fitted
     here = along(foot.training(model), fitted.linear.program, fitted.linear.point)
     starts = [polished(model, foot, fitted.theta, here.nodes), polished(model, foot, guesses, None)]
-    found = min((freed(timed(start)) for start in starts), key=lambda end: end.objective)
+    found = freed(min((loosened(timed(start)) for start in starts), key=lambda end: end.objective))
     return fitted if innovations(found).significant(level_of(model.problem)) else found
 
 

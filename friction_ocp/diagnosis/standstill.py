@@ -86,9 +86,12 @@ def _moves(program: Program, column: int) -> bool:
     mech, item = program.drive.mechanism, program.experiments[0]
     group = mech.free_groups[column - len(mech.angle_groups)]
     for k, channel in enumerate(mech.drive.outputs):
-        values = item.measured[np.isfinite(item.measured[:, k]), k][:BEGINNING]
-        if mech.topology.group_of.get(channel.part) != group or values.size < BEGINNING:
+        rows = np.flatnonzero(np.isfinite(item.measured[:, k]))[:BEGINNING]
+        if mech.topology.group_of.get(channel.part) != group or rows.size < BEGINNING:
             continue
+        if item.repeated[: rows[-1], k].any():  # it stays at one count
+            continue
+        values = item.measured[rows, k]
         limit = MOVES * float(program.noise[k])
         if channel.signal == "theta" and _goes_on(values, limit):
             return True

@@ -14,9 +14,11 @@ from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.parts import Channel
 from friction_ocp.drive.stepping import SteppedDrive
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.estimation.noise import step_of
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.recording.conditioning import high_frequency_noise, reach_of_ends, smooth_motion
 from friction_ocp.recording.recording import Recording
+from friction_ocp.recording.repeats import repeated
 from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, IntArray, build_grid
 
 STILL, NOISE_OF_REST = 1e-3, 3.0
@@ -25,7 +27,7 @@ MOST_LOST = 0.1
 """Share of a prescribed motion that is left out at an end at most, where noise hides its acceleration."""
 
 
-COLUMNS = ("measured", "smooth", "rate", "curvature", "lost")
+COLUMNS = ("measured", "smooth", "rate", "curvature", "lost", "repeated")
 """What an experiment holds of every output at every node."""
 
 
@@ -45,12 +47,19 @@ class Experiment:
     """(n, outputs) their second time derivatives."""
     lost: BoolArray
     """(n, outputs) where there was a sample before late channels were read earlier, and is none now."""
+    repeated: BoolArray
+    """(n, outputs) where the error of rounding of a sample is that of others, which tell what it would."""
     late: Mapping[str, float] = field(default_factory=dict[str, float])
     """By channel: the part of its delay, s, that is undone by reading its samples earlier."""
 
     def signals(self, nodes: IntArray | int | slice) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return what makes a state of the measurement: smoothed outputs, two derivatives of them, and inputs."""
         return self.smooth[nodes], self.rate[nodes], self.curvature[nodes], self.grid.at_node[nodes]
+
+    def told_once(self) -> Experiment:
+        """Return the recording without samples whose errors of rounding others have, too."""
+        measured = np.where(self.repeated, np.nan, self.measured)
+        return replace(self, measured=measured, lost=self.lost & ~self.repeated)
 
 
 def known_delay(channel: Channel) -> float:
@@ -90,6 +99,7 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         rate=np.column_stack([rate for _, rate, _ in motions]),
         curvature=np.column_stack([bend for _, _, bend in motions]),
         lost=np.zeros((grid.time.size, len(columns)), dtype=bool),
+        repeated=np.column_stack([_repeated(grid, use, channel) for channel in outputs]),
     )
 
 
@@ -164,9 +174,23 @@ def _near_rest(grid: Grid, drive: SteppedDrive, speed_of: str, use: RecordingUse
 def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:
     channel = use.recording.channels[name]
     column = np.full(grid.time.size, np.nan)
-    at = np.clip(np.searchsorted(grid.time, channel.time - 1e-9), 0, grid.time.size - 1)
-    column[at] = channel.values
+    column[_nodes(grid, channel.time)] = channel.values
     return column
+
+
+def _repeated(grid: Grid, use: RecordingUse, channel: Channel) -> BoolArray:
+    """Return (n,) whether the sample of a channel at a node errs by what another errs by."""
+    recorded = use.recording.channels[channel.name]
+    seen = np.isfinite(recorded.values)
+    values, found = recorded.values[seen], np.zeros(grid.time.size, dtype=bool)
+    step = step_of(channel, values)
+    if step is not None:
+        found[_nodes(grid, recorded.time[seen])] = repeated(values, step)
+    return found
+
+
+def _nodes(grid: Grid, time: FloatArray) -> IntArray:
+    return np.clip(np.searchsorted(grid.time, time - 1e-9), 0, grid.time.size - 1)
 
 
 def _smooth(grid: Grid, use: RecordingUse, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -48,8 +48,10 @@ def read_earlier(item: Experiment, names: Sequence[str], late: Mapping[str, floa
         for key in ("smooth", "rate", "curvature"):
             columns[key][:, k] = _shifted(columns[key][:, k], step, columns[key][beyond, k])
         columns["measured"][:, k] = _shifted(columns["measured"][:, k], step, np.nan)
+        columns["repeated"][:, k] = _shifted(columns["repeated"][:, k], step, False)
     had = np.isfinite(item.measured) | item.lost
     columns["lost"] = np.where(np.array(steps) != 0, had & ~np.isfinite(columns["measured"]), item.lost)
+    columns["repeated"] = np.where(columns["lost"], item.repeated, columns["repeated"])
     return replace(item, **columns, late={name: value for name, value in late.items() if name in names})
 
 

@@ -61,6 +61,11 @@ def noise_floor(channel: Channel, signals: list[tuple[FloatArray, FloatArray]]) 
     return NoiseFloor(1e-3 * spread if spread > 0 else 1.0, "assumed")
 
 
+def step_of(channel: Channel, values: FloatArray) -> float | None:
+    """Return the step of a channel, as stated or as its values show it."""
+    return detect_resolution(values) if channel.resolution is None else channel.resolution
+
+
 def _repeated_runs(signals: list[tuple[FloatArray, FloatArray]]) -> float | None:
     """Return the deviation between runs that follow the same path at the same times, None where there are none."""
     variances: list[float] = []
