@@ -55,7 +55,12 @@ def freed(fitted: FittedModel) -> FittedModel:
         beyond = around_kinks(fitted.model, program, point, WARM)
         best = beyond.point if beyond.objective < fitted.objective else point
         best = unstuck(fitted.model, program, best)
-    return fitted if best is point else replace(fitted, linear=linear_program(program, best))
+    return _moved(fitted, best)
+
+
+def _moved(fitted: FittedModel, point: Point) -> FittedModel:
+    program = fitted.linear.program
+    return fitted if point is fitted.linear.point else replace(fitted, linear=linear_program(program, point))
 
 
 def _stepped_out(model: Model, program: Program, point: Point) -> Point:
@@ -97,9 +102,7 @@ def _axes(program: Program, point: Point) -> FloatArray:
 
 def loosened(fitted: FittedModel) -> FittedModel:
     """Go on from fresh nodes, or from those that friction with a hardly smoothed sign leads to, if that leads on."""
-    program, point = fitted.linear.program, fitted.linear.point
-    best = unstuck(fitted.model, program, point)
-    return fitted if best is point else replace(fitted, linear=linear_program(program, best))
+    return _moved(fitted, unstuck(fitted.model, fitted.linear.program, fitted.linear.point))
 
 
 def unstuck(model: Model, program: Program, point: Point) -> Point:
