@@ -152,11 +152,14 @@ def pieces(item: Experiment, count: int) -> list[Experiment]:
 
 
 def training_pieces(model: Model) -> tuple[Experiment, ...]:
-    """Return what the search goes by of the training recordings, without samples beside jumps: of one piece, pieces."""
+    """Return what the search goes by of the training recordings, without samples beside jumps: of one piece, pieces.
+
+    Samples that share their errors of rounding are marked.
+    """
     first, *others = known = excerpts(model)
     whole = known if others else tuple(pieces(first, FOLDS))
     outputs = model.drive.mechanism.drive.outputs
-    return tuple(without_jumps(item, outputs, model.noise) for item in whole)
+    return tuple(without_jumps(item, outputs, model.noise).marked(outputs) for item in whole)
 
 
 def footing(model: Model, theta: FloatArray, loss: AbstractLoss = Squares()) -> Footing:

@@ -48,7 +48,7 @@ class Experiment:
     lost: BoolArray
     """(n, outputs) where there was a sample before late channels were read earlier, and is none now."""
     repeated: BoolArray
-    """(n, outputs) where the error of rounding of a sample is that of others, which tell what it would."""
+    """(n, outputs) where a sample has the error of rounding of others, which tell what it would, once `marked`."""
     late: Mapping[str, float] = field(default_factory=dict[str, float])
     """By channel: the part of its delay, s, that is undone by reading its samples earlier."""
 
@@ -56,8 +56,22 @@ class Experiment:
         """Return what makes a state of the measurement: smoothed outputs, two derivatives of them, and inputs."""
         return self.smooth[nodes], self.rate[nodes], self.curvature[nodes], self.grid.at_node[nodes]
 
+    def marked(self, outputs: Sequence[Channel]) -> Experiment:
+        """Return the recording with its samples marked whose errors of rounding others have, too.
+
+        That takes longer than to lay a grid, and few programs ask for it.
+        """
+        found = np.zeros(self.measured.shape, dtype=bool)
+        for k, channel in enumerate(outputs):
+            seen = np.isfinite(self.measured[:, k])
+            values = self.measured[seen, k]
+            step = step_of(channel, values)
+            if step is not None:
+                found[seen, k] = repeated(values, step)
+        return replace(self, repeated=found)
+
     def told_once(self) -> Experiment:
-        """Return the recording without samples whose errors of rounding others have, too."""
+        """Return the recording without the samples that are marked."""
         measured = np.where(self.repeated, np.nan, self.measured)
         return replace(self, measured=measured, lost=self.lost & ~self.repeated)
 
@@ -99,7 +113,7 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         rate=np.column_stack([rate for _, rate, _ in motions]),
         curvature=np.column_stack([bend for _, _, bend in motions]),
         lost=np.zeros((grid.time.size, len(columns)), dtype=bool),
-        repeated=np.column_stack([_repeated(grid, use, channel) for channel in outputs]),
+        repeated=np.zeros((grid.time.size, len(columns)), dtype=bool),
     )
 
 
@@ -174,23 +188,9 @@ def _near_rest(grid: Grid, drive: SteppedDrive, speed_of: str, use: RecordingUse
 def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:
     channel = use.recording.channels[name]
     column = np.full(grid.time.size, np.nan)
-    column[_nodes(grid, channel.time)] = channel.values
+    at = np.clip(np.searchsorted(grid.time, channel.time - 1e-9), 0, grid.time.size - 1)
+    column[at] = channel.values
     return column
-
-
-def _repeated(grid: Grid, use: RecordingUse, channel: Channel) -> BoolArray:
-    """Return (n,) whether the sample of a channel at a node errs by what another errs by."""
-    recorded = use.recording.channels[channel.name]
-    seen = np.isfinite(recorded.values)
-    values, found = recorded.values[seen], np.zeros(grid.time.size, dtype=bool)
-    step = step_of(channel, values)
-    if step is not None:
-        found[_nodes(grid, recorded.time[seen])] = repeated(values, step)
-    return found
-
-
-def _nodes(grid: Grid, time: FloatArray) -> IntArray:
-    return np.clip(np.searchsorted(grid.time, time - 1e-9), 0, grid.time.size - 1)
 
 
 def _smooth(grid: Grid, use: RecordingUse, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
