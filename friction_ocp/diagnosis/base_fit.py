@@ -14,17 +14,18 @@ from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.own_noise import noise_moved
-from friction_ocp.diagnosis.polishing import COARSE, WARM, loosely_joined, polished, timed
+from friction_ocp.diagnosis.polishing import COARSE, loosely_joined, polished, timed
 from friction_ocp.diagnosis.sharpening import fitted_sharply
-from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import fit
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.node_ends import WARM
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions
+from friction_ocp.estimation.standstill import settled
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute
 

@@ -16,7 +16,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
-from friction_ocp.diagnosis.polishing import UNIMPORTANT, begun, loosely_joined
+from friction_ocp.diagnosis.polishing import loosely_joined
 from friction_ocp.diagnosis.refit import NUDGES, begun_again, guessed, nudged, nudged_along
 from friction_ocp.diagnosis.sharpening import fitted_sharply, seen_on
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant, slow_torques
@@ -26,6 +26,7 @@ from friction_ocp.effects.effect import Clues
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
+from friction_ocp.estimation.node_ends import UNIMPORTANT, begun
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
 from friction_ocp.execution.content import fingerprint

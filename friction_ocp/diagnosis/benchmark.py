@@ -10,9 +10,9 @@ import numpy as np
 from friction_ocp.diagnosis.blocks import Blocks
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.rival import Standing
 from friction_ocp.diagnosis.select import resamples, schwarz
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.simulation.grid import FloatArray
 
 

@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import group_inertias
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.drive.input_noise import NOISE
 from friction_ocp.drive.mechanism import column
@@ -20,6 +19,7 @@ from friction_ocp.drive.stepping import state_symbols
 from friction_ocp.drive.torques import elastic_torque, plain_twist
 from friction_ocp.drive.units import DRIVE_TORQUE
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.estimation.drive_noise import group_inertias
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.nodes import solve_nodes

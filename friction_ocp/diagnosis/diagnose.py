@@ -17,7 +17,6 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, comes_closer, fr
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
 from friction_ocp.diagnosis.loop import driven_as_recorded
 from friction_ocp.diagnosis.options import Considered, considered, effort_of, level_of
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.predicted import LEAST_SHARE, led_by_predictions
 from friction_ocp.diagnosis.reading import explains_more, is_needless, leaves_less
 from friction_ocp.diagnosis.refit import begun_again
@@ -29,6 +28,7 @@ from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import Key
 from friction_ocp.effects.stated_values import STATED
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.statistics.execution import Execution

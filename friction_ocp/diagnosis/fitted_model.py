@@ -13,12 +13,12 @@ from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import LinearProgram
 from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.node_ends import STEPS_OF_NODES
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.execution.effort import once
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
-STEPS_OF_NODES = 3
 AT_ODDS = 5.0
 """Standard deviations of its prior from which a fitted value stands in for what is missing, or the prior is wrong."""
 

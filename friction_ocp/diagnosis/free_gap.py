@@ -9,9 +9,9 @@ import numpy as np
 
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import within
 from friction_ocp.diagnosis.held_out import fitted_without, folds
 from friction_ocp.diagnosis.regimes import REGIMES, regimes
+from friction_ocp.estimation.drive_noise import within
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.score import FreeRun, simulate_recordings
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray

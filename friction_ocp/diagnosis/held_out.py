@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import around_kinks
 from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
+from friction_ocp.estimation.node_ends import STEPS_OF_NODES, UNIMPORTANT
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.own_numbers import fitted_again
 from friction_ocp.estimation.program import Point, Program, Tether

@@ -13,10 +13,10 @@ import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import input_noise
 from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.diagnosis.rounding import wave_powers
 from friction_ocp.drive.parts import Channel
+from friction_ocp.estimation.drive_noise import input_noise
 from friction_ocp.estimation.noise import step_of
 from friction_ocp.estimation.torque_noise import driving
 from friction_ocp.simulation.grid import FloatArray, IntArray

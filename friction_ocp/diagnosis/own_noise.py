@@ -13,10 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.footing import Footing, gap_roots, input_impulses, torque_noise
+from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import LinearRecording
+from friction_ocp.estimation.drive_noise import input_impulses, torque_noise
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.node_gaps import gap_roots
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import Segments
 from friction_ocp.simulation.grid import FloatArray

@@ -1,36 +1,25 @@
-"""Minimise the likelihood of a model on a footing, and give segments the nodes that fit them."""
+"""Minimise the likelihood of a model on a footing."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from friction_ocp.diagnosis.excerpts import excerpts
-from friction_ocp.diagnosis.fitted_model import STEPS_OF_NODES, FittedModel
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.standstill import settled
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model, in_time
+from friction_ocp.estimation.node_ends import MOST_TURNS, WARM, begun
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.estimation.splicing import carried_on
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
 COARSE = Tolerances(decrease=1e-3, progress=1e-2, max_iterations=12)
 QUICK = Tolerances(decrease=1e-4, negligible=0.1, progress=1e-3, max_iterations=10)
-WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
-MOST_TURNS = 8
-UNIMPORTANT = 1.0
-"""Difference of the objective that is not worth a step; half a unit is a standard error."""
-NEGLIGIBLE = 0.05
-"""The same for one of several steps of the nodes."""
-MARGINAL = 1e-3
-"""Share of what noise does not explain that is not worth going on for."""
 
 
 def polished(
@@ -50,26 +39,6 @@ def polished(
     return FittedModel(model, foot, linear_program(program, end.point))
 
 
-def begun(program: Program, theta: FloatArray) -> Point:
-    """Return parameters with the nodes that fit them best."""
-    point = solve_nodes(program, suggested_point(program, theta))
-    if program.without_nodes:
-        return point
-    return joined(program, settled(program, point))
-
-
-def joined(program: Program, point: Point) -> Point:
-    """Return the point with nodes that go on from where the segments before them end, as long as that leads on."""
-    cost = program.objective(point)
-    for _ in range(MOST_TURNS):
-        trial = solve_nodes(program, carried_on(program, point), STEPS_OF_NODES, NEGLIGIBLE)
-        after = program.objective(trial)
-        if not after < cost - worthwhile(program, cost):
-            break
-        point, cost = trial, after
-    return point
-
-
 def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program, Point]:
     """Return segments joined by gaps that any error of the model may take, and the best point from some parameters.
 
@@ -84,11 +53,6 @@ def loosely_joined(model: Model, starts: Sequence[FloatArray]) -> tuple[Program,
 def loosely(model: Model, values: Mapping[str, float]) -> FloatArray:
     """Return the parameters that are best on loosely joined segments, from some values."""
     return loosely_joined(model, [model.space.clip(model.space.with_known(values))])[1].theta
-
-
-def worthwhile(program: Program, cost: float) -> float:
-    """Return the decrease of a cost that is worth going on for: more than chance, and a share of what is left."""
-    return max(UNIMPORTANT, MARGINAL * (cost - 0.5 * program.samples)) if np.isfinite(cost) else UNIMPORTANT
 
 
 def timed(fitted: FittedModel, limits: Tolerances = WARM) -> FittedModel:

@@ -11,10 +11,11 @@ from friction_ocp.diagnosis.easing import eased
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.led_back import led_back
-from friction_ocp.diagnosis.polishing import QUICK, UNIMPORTANT, loosely, loosely_joined, polished, timed
+from friction_ocp.diagnosis.polishing import QUICK, loosely, loosely_joined, polished, timed
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
 from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.simulation.grid import FloatArray

@@ -19,7 +19,6 @@ from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.left_out import LeftOut
 from friction_ocp.diagnosis.options import NONE, Considered, places
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
@@ -29,6 +28,7 @@ from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
 from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, required, samples, shapes, shortlist
 from friction_ocp.effects.effect import Key
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.effort import effort
 from friction_ocp.statistics.execution import Execution

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import input_noise
 from friction_ocp.diagnosis.free_gap import FreeErrors, excess_of
+from friction_ocp.estimation.drive_noise import input_noise
 from friction_ocp.estimation.experiment import Experiment, experiment
 from friction_ocp.estimation.lateness import read_earlier
 from friction_ocp.estimation.model import Model

@@ -10,7 +10,6 @@ import numpy as np
 from friction_ocp.diagnosis.bench import Bench
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.reexamine import gaining, weighed_again
 from friction_ocp.diagnosis.refit import MOST_OF
 from friction_ocp.diagnosis.rival import Rival, is_same
@@ -18,6 +17,7 @@ from friction_ocp.diagnosis.select import Round, with_first, without
 from friction_ocp.diagnosis.worth import grows
 from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 
 
 def weighed_in_shape(

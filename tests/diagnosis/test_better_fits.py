@@ -15,12 +15,12 @@ from friction_ocp.diagnosis.crew import Crew, held_out_costs
 from friction_ocp.diagnosis.easing import FAR
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.diagnosis.refit import nudged_along, untold_ways
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import with_drive
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
 from friction_ocp.execution.executor import InProcess

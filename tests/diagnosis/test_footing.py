@@ -14,19 +14,13 @@ from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, VISCOUS, axis, write
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.excess import DOUBTED
-from friction_ocp.diagnosis.footing import (
-    NUMERICAL_INPUT,
-    Footing,
-    footing,
-    input_noise,
-    pieces,
-    still_gaps,
-    torque_noise,
-)
-from friction_ocp.diagnosis.gathered_noise import slopes_about, unit_covariances
+from friction_ocp.diagnosis.footing import Footing, footing, pieces
 from friction_ocp.diagnosis.worth import innovations
+from friction_ocp.estimation.drive_noise import NUMERICAL_INPUT, input_noise, torque_noise
 from friction_ocp.estimation.gap import start_weight
+from friction_ocp.estimation.gathered_noise import slopes_about, unit_covariances
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.node_gaps import still_gaps
 from friction_ocp.problem_file.load import load_problem
 
 STIFFNESS, DAMPING = 200.0, 0.1

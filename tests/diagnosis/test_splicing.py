@@ -8,10 +8,10 @@ from diagnosis_cases import axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.kinks import unstuck
-from friction_ocp.diagnosis.polishing import UNIMPORTANT
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.rough_bowl import unstuck
 from friction_ocp.estimation.splicing import carried_on, spliced
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.grid import FloatArray

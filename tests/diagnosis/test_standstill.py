@@ -11,12 +11,13 @@ from diagnosis_cases import COULOMB, INERTIA, OFF, VISCOUS, axis, write_case
 
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.footing import FOLDS
-from friction_ocp.diagnosis.standstill import beside_jumps, settled
+from friction_ocp.diagnosis.jumps import beside_jumps
 from friction_ocp.estimation.first_nodes import carrying
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.modes import STEP_PER_RADIAN
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.standstill import settled
 from friction_ocp.problem_file.load import load_problem
 
 SLIDING = 0.3

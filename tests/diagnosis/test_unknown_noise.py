@@ -17,10 +17,10 @@ from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.polishing import begun
 from friction_ocp.diagnosis.sharpening import seen_on, sharpened
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.node_ends import begun
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.simulation.grid import FloatArray

@@ -21,9 +21,9 @@ from plant import (
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.free_gap import left_out_errors
-from friction_ocp.diagnosis.polishing import begun
 from friction_ocp.diagnosis.sharpening import sharpened
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.node_ends import begun
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.recording.recording import Channel, Recording

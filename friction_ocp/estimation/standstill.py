@@ -1,18 +1,15 @@
-"""What a derivative cannot see: how a recording starts, and the instant at which an acceleration jumps."""
+"""How a recording starts: at rest, or with bristles that carry nothing. A derivative cannot see it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.drive.parts import Channel
-from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import carrying, suggested_nodes
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
-from friction_ocp.simulation.grid import BoolArray, FloatArray
+from friction_ocp.simulation.grid import FloatArray
 
 STEPS = 6
 """Of the nodes of a recording from a start at rest."""
@@ -20,10 +17,6 @@ BEGINNING = 20
 """Samples from which a recording that does not start at rest is told."""
 MOVES = 5.0
 """Travel in the beginning, or speed, over the noise of a channel from which it moves."""
-CLEAR = 5.0 * np.sqrt(5.0)
-"""Step beyond those beside it, over the noise of a channel, that noise alone does not make: five deviations."""
-RARE = 0.05
-"""Share of samples beside jumps."""
 
 
 def settled(program: Program, point: Point) -> Point:
@@ -110,30 +103,3 @@ def _line(values: FloatArray, degree: int) -> list[float]:
     """Return the coefficients, highest first, of the polynomial through values over [0, 1]."""
     found = np.asarray(np.polyfit(np.linspace(0.0, 1.0, values.size), values, degree), dtype=np.float64)
     return [float(item) for item in found]
-
-
-def without_jumps(item: Experiment, outputs: Sequence[Channel], noise: FloatArray) -> Experiment:
-    """Return a recording without the samples of accelerations on both sides of a jump.
-
-    Friction changes its sign between two samples; which of them a simulation finds behind the jump is chance.
-    """
-    measured = item.measured.copy()
-    for k, channel in enumerate(outputs):
-        if channel.signal == "alpha":
-            measured[beside_jumps(measured[:, k], float(noise[k])), k] = np.nan
-    return replace(item, measured=measured)
-
-
-def beside_jumps(values: FloatArray, noise: float) -> BoolArray:
-    """Return (n,) whether a sample lies next to a step that its neighbours do not lead up to.
-
-    Where such steps are common they are no jumps but a vibration, and none is returned.
-    """
-    found = np.zeros(values.size, dtype=bool)
-    step = np.diff(values)
-    if step.size < 3:
-        return found
-    jump = np.abs(step[1:-1] - 0.5 * (step[:-2] + step[2:])) > CLEAR * noise
-    found[1:-2] |= jump
-    found[2:-1] |= jump
-    return found if np.mean(found) < RARE else np.zeros_like(found)
