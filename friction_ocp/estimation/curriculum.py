@@ -38,6 +38,8 @@ def enter_in_turn(model: Model) -> bool:
 
 def may_be_cut(model: Model, program: Program) -> bool:
     """Whether segments are relaxed, and cut where differences grow: where they have been, or would have been."""
+    if model.tells_noise:
+        return False
     return not fits_free_run(model) and (is_divided(model, program) or enter_in_turn(model))
 
 

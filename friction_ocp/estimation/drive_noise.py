@@ -38,6 +38,12 @@ class TorqueNoise:
     """By recording: the numbers of the drive, with which noise of torque becomes noise of motion."""
 
 
+def made_by_inputs(model: Model) -> TorqueNoise:
+    """Return the torque noise that noise of measured inputs makes, at what gaps between segments are laid for."""
+    numbers = {use.name: model.space.numbers_by_path(model.nominal, use.name) for use in model.problem.recordings}
+    return TorqueNoise(_input_density(model, numbers[model.train[0].name]), numbers)
+
+
 def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:
     """Return the density of torque noise by shaft, N m/sqrt(Hz): stated, and from the noise of measured inputs.
 
@@ -45,9 +51,14 @@ def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]
     """
     options = model.problem.estimation
     stated = options.process_noise.keys() - set(options.estimated_noise)
-    power = {shaft: options.process_noise[shaft] ** 2 for shaft in sorted(stated)}
-    for shaft, value in input_power(model.problem.drive, numbers, partial(input_noise, model)).items():
-        power[shaft] = power.get(shaft, 0.0) + value
+    density = {shaft: options.process_noise[shaft] for shaft in sorted(stated)}
+    for shaft, value in _input_density(model, numbers).items():
+        density[shaft] = float(np.hypot(density.get(shaft, 0.0), value))
+    return density
+
+
+def _input_density(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:
+    power = input_power(model.problem.drive, numbers, partial(input_noise, model))
     return {shaft: float(np.sqrt(value)) for shaft, value in power.items()}
 
 

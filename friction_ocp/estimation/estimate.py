@@ -11,21 +11,23 @@ import numpy as np
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
+from friction_ocp.estimation.drive_noise import made_by_inputs, within
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.identifiability import Verdict, beyond_the_log, named_in_trades, verdicts
 from friction_ocp.estimation.influence import influence
+from friction_ocp.estimation.innovations import innovations
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
+from friction_ocp.estimation.preparation import prepare_identification
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.progress import Progress, Report, silent
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.sampling_limit import beyond_sampling
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
-from friction_ocp.estimation.torque_noise import prepare_identification
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, whiteness
@@ -171,7 +173,7 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         residuals=residuals,
         curves=friction_curves(model, theta, doubt.covariance, simulation.train),
         warnings=(
-            *warnings_of(solution, parameters, doubt, residuals, simulation),
+            *warnings_of(solution, parameters, doubt, residuals, simulation, _drifts(model, simulation)),
             *(_missed_warning(fit) for fit in missed),
         ),
         solver=SolverFacts(
@@ -184,6 +186,14 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         ),
         noise_levels=model.noise_levels,
     )
+
+
+def _drifts(model: Model, simulation: Simulation) -> dict[str, float]:
+    """Return by channel how far noise of noisy inputs moves a free run, over the noise floor."""
+    if not model.noisy_inputs or simulation.horizon_s is None:
+        return {}
+    moved = np.sqrt(within(model, made_by_inputs(model), model.train[0], simulation.horizon_s)) / model.noise
+    return dict(zip(model.drive.output_names, map(float, moved), strict=True))
 
 
 def _missed_warning(fit: StaticFit) -> str:
@@ -247,7 +257,10 @@ def _residual_tests(fitted: Fitted) -> dict[str, dict[str, Whiteness]]:
     program, point = fitted.program, fitted.solution.point
     tests: dict[str, dict[str, Whiteness]] = {}
     for index, item in enumerate(program.experiments):
-        residuals = program.residuals(index, program.simulate(index, point).y)
+        if program.drive.noisy_inputs and not program.segments[index].measured:
+            residuals = innovations(program, point, index)
+        else:
+            residuals = program.residuals(index, program.simulate(index, point).y)
         tests[item.name] = {}
         for column, name in enumerate(program.drive.output_names):
             seen = np.isfinite(residuals[:, column])

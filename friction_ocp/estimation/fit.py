@@ -10,16 +10,18 @@ from friction_ocp.estimation.division import are_alike, divided_afresh, moved_sh
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held, longest_recording
 from friction_ocp.estimation.kept_loss import fit_kept
-from friction_ocp.estimation.model import Model, laid_for
+from friction_ocp.estimation.model import Model, laid_for, late_of, with_late
 from friction_ocp.estimation.noise_level import most_likely, with_levels
 from friction_ocp.estimation.points_fit import fit_points
+from friction_ocp.estimation.preparation import joined_by_input_noise
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
 from friction_ocp.estimation.stages import WIDTHS, keeps_the_loss
 from friction_ocp.estimation.starts import start_points
-from friction_ocp.estimation.synchronise import synchronised
+from friction_ocp.estimation.synchronise import moves_of, synchronised, with_moves
+from friction_ocp.estimation.told_noise import with_told_noise
 from friction_ocp.simulation.losses import Squares
 
 EXPECTED_PHASES = 16
@@ -54,10 +56,14 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
 
-    Return the model with these stamps, levels and steps. Shorter steps move the kinks of exact friction, and what was
-    the best end between them need not be it any more; nor need segments be cut where they should be.
+    Noise of measured inputs that rules is told sample by sample. Return the model with these stamps, levels and steps.
+    Shorter steps move the kinks of exact friction, and what was the best end between them need not be it any more; nor
+    need segments be cut where they should be.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
+    told = _told(model, progress, phases) if model.noisy_inputs else None
+    if told is not None:
+        return refined(*told, phases)
     model, fitted = synchronised(model, fit(model, progress), phases)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
@@ -67,6 +73,14 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     if fits_free_run(model):
         return finer, detour(finer, fitted, phases)
     return relaid(finer, fitted, phases, CUTS)
+
+
+def _told(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
+    """Fit with the noise of noisy inputs as unknowns; None where that leaves more than noise."""
+    blunt = joined_by_input_noise(replace(model, tells_noise=False))
+    seen, joined = synchronised(blunt, fit(blunt, progress), phases)
+    as_seen = with_late(with_moves(model, moves_of(seen)), late_of(seen))
+    return with_told_noise(as_seen, joined, phases)
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:

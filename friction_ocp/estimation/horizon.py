@@ -45,6 +45,8 @@ def judged_alike(model: Model) -> Model:
 
 def fits_free_run(model: Model) -> bool:
     """Whether the fit minimises the error of the free run rather than that of relaxed segments."""
+    if model.tells_noise:
+        return False
     chosen = model.problem.estimation.fit
     return chosen == "simulation" if chosen else horizon(model) is None
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friction_ocp.drive.input_noise import noise_states
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
@@ -15,7 +16,7 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Influence:
-    """Effective Jacobian rows of all measured samples and gaps, prior rows apart."""
+    """Effective Jacobian rows of all measured samples, gaps and unknown noise of inputs, prior rows apart."""
 
     jacobian: FloatArray
     """(rows, parameters): derivative of each scaled residual along the manifold of solved nodes."""
@@ -56,6 +57,20 @@ def influence(program: Program, point: Point) -> Influence:
     return Influence(jacobian, residual, weight, curvature, recording, window, time, np.diag(pull))
 
 
+def _of_noise(
+    program: Program, point: Point, index: int, nodes: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the rows of the noise of inputs found at every node; `nodes` (segments, states, parameters) are slopes."""
+    cut, item = program.segments[index], program.experiments[index]
+    assert cut.start_weight is not None
+    columns = list(noise_states(program.drive)[0])
+    weight = cut.start_weight[cut.tied][:, columns]
+    errors: FloatArray = (weight * point.nodes[index][cut.tied][:, columns]).ravel()
+    rows = (weight[:, :, None] * nodes[cut.tied][:, columns]).reshape(errors.size, -1)
+    at = np.repeat(item.grid.time[cut.first[cut.tied]], len(columns))
+    return rows, errors, errors, np.ones(errors.size), at
+
+
 def _windows(program: Program, index: int, time: FloatArray) -> IntArray:
     """Return (rows,) which free run of a recording, or of static points behind the recordings, each row belongs to."""
     if index >= len(program.experiments) or program.segments[index].gap_weight is not None:
@@ -94,5 +109,7 @@ def _of_recording(
         moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
         parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
+    if program.drive.noisy_inputs:
+        parts.append(_of_noise(program, point, index, nodes))
     order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")
     return tuple(np.concatenate(column)[order] for column in zip(*parts, strict=True))  # pyright: ignore[reportReturnType]

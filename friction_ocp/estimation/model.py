@@ -64,6 +64,10 @@ class Model:
     """Torque noise that was estimated."""
     found: Mapping[str, float] = field(default_factory=dict[str, float])
     """Parameters that gaps between segments and sizes of states are laid for, by name; guesses of those it lacks."""
+    noisy_inputs: tuple[str, ...] = ()
+    """Measured inputs whose noise moves a channel, within two samples, by more than the channel's own."""
+    tells_noise: bool = False
+    """Whether fits end with programs in which that noise is an unknown of every sample."""
 
     @property
     def nominal(self) -> FloatArray:

@@ -153,14 +153,15 @@ class Program:
     def point_along(self, other: Program, at: Point) -> Point:
         """Return the parameters of `at` with every node where the simulation of another program at `at` passes it.
 
-        States that this one has beyond those of the other are zero: noise of inputs.
+        States that this one has beyond those of the other are zero: noise of inputs. Those it lacks are left out.
         """
         nodes: list[FloatArray] = []
         for index, cut in enumerate(self.segments):
             track = other.simulate(index, at, with_states=True).states
             assert track is not None
             passed = np.zeros((cut.count, len(self.drive.state_names)))
-            passed[:, : track.shape[1]] = track[cut.first[:-1]]
+            known = min(passed.shape[1], track.shape[1])
+            passed[:, :known] = track[cut.first[:-1], :known]
             nodes.append(passed)
         return Point(at.theta, tuple(nodes))
 

@@ -35,7 +35,8 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     program, point, first = fitted.program, fitted.solution.point, model.max_step
     for _ in range(HALVINGS):
         finer = with_step(model, 0.5 * model.max_step)
-        fine = replace(program, experiments=finer.train)
+        stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
+        fine = replace(program, experiments=tuple(stepped))
         if np.max(_shift(program, fine, point), initial=0.0) <= SHIFT:
             break
         model, program = finer, fine

@@ -13,6 +13,7 @@ from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, Watch, solve_gauss_newton
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.node_ends import NEGLIGIBLE
 from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
@@ -27,6 +28,7 @@ from friction_ocp.estimation.stages import (
     relaxed,
     roundings_of,
 )
+from friction_ocp.estimation.unknown_noise import telling_program
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import AbstractLoss, Squares
 
@@ -75,6 +77,8 @@ def windowed(span: float | None) -> Builder:
 
 def program_builder(model: Model) -> Builder:
     """Return what makes the program that a fit ends with."""
+    if model.tells_noise:
+        return telling_program
     return windowed(horizon(model)) if fits_free_run(model) else joined
 
 
@@ -91,10 +95,12 @@ def limits(model: Model) -> Tolerances:
     """Return when the last fit of a model stops.
 
     A fit that ends at the noise has an objective of half a unit a sample, and a standard error is half a unit of it:
-    over many samples a small share of the objective still is a long way.
+    over many samples a small share of the objective still is a long way. Segments so short that noise joins them stick
+    and slide one by one: less than their roughness is no way.
     """
+    least = NEGLIGIBLE if model.noisy_inputs else LEAST
     samples = max(sum(int(np.isfinite(item.measured).sum()) for item in model.train), 1)
-    return replace(FINE, idle=LEAST / (0.5 * samples), max_iterations=model.problem.estimation.max_iterations)
+    return replace(FINE, idle=least / (0.5 * samples), max_iterations=model.problem.estimation.max_iterations)
 
 
 def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:

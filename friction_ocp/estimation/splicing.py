@@ -53,6 +53,12 @@ def carried_on(program: Program, point: Point) -> Point:
     return point
 
 
+def segment_costs(program: Program, point: Point) -> FloatArray:
+    """Return (segments of all recordings,) the costs of the samples in each segment and of the gap before it."""
+    both = [_costs(program, index, point) for index in range(len(program.segments))]
+    return np.concatenate([samples + gaps[:-1] for samples, gaps in both])
+
+
 def _costs(program: Program, index: int, point: Point) -> tuple[FloatArray, FloatArray]:
     """Return (segments,) costs of the samples in each segment, and (segments + 1,) of the gap before each."""
     cut, result = program.segments[index], program.simulate(index, point)

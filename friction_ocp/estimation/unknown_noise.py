@@ -8,10 +8,18 @@ a rotor that is stated rightly looks too light. With the noise of every sample a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.estimation.drive_noise import TorqueNoise, group_density, input_impulses, input_noise, within
+from friction_ocp.estimation.drive_noise import (
+    TorqueNoise,
+    group_density,
+    input_impulses,
+    input_noise,
+    made_by_inputs,
+    within,
+)
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import start_weight
 from friction_ocp.estimation.model import Model
@@ -49,6 +57,17 @@ def unknown_inputs(model: Model, noise: TorqueNoise, items: Sequence[Experiment]
 def blurred(model: Model, noise: TorqueNoise) -> FloatArray:
     """Return (outputs,) noise floors with what late channels leave out of the noise that moves them."""
     return np.sqrt(model.noise**2 + _late_variance(model, noise, model.train[0]))
+
+
+def telling_program(model: Model, width: float, loss: AbstractLoss) -> Program:
+    """Return the program of the training recordings that takes the noise of the noisy inputs of a model as unknowns.
+
+    `width` is the smoothing of the sign over the typical speed.
+    """
+    noise, outputs = made_by_inputs(model), model.drive.mechanism.drive.outputs
+    known = (model.noisy_inputs, tuple(item.marked(outputs) for item in model.train), blurred(model, noise))
+    program = unknown_noise_program(model, noise, *known, width * model.speed_scale, loss)
+    return replace(program, static=model.static)
 
 
 def unknown_noise_program(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+import numpy as np
+
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.identifiability import Verdict
 from friction_ocp.estimation.score import Errors
@@ -43,8 +45,12 @@ def warnings_of(
     doubt: Uncertainty,
     residuals: Mapping[str, Mapping[str, Whiteness]],
     scored: Scored,
+    drifts: Mapping[str, float] | None = None,
 ) -> tuple[str, ...]:
-    """Return every reason to doubt the answer, the gravest first."""
+    """Return every reason to doubt the answer, the gravest first.
+
+    `drifts` says by channel how far, over its noise floor, noise of measured inputs moves the free run.
+    """
     texts: list[str] = []
     if not solution.converged:
         texts.append(
@@ -53,7 +59,7 @@ def warnings_of(
         )
     texts += [_parameter_warning(item) for item in parameters if item.verdict.word not in ("ok", "traded")]
     texts += _trade_warnings([item for item in parameters if item.verdict.word == "traded"])
-    texts += _misfit_warnings(doubt, residuals, scored, solution.converged)
+    texts += _misfit_warnings(doubt, residuals, scored, solution.converged, drifts or {})
     return tuple(texts)
 
 
@@ -94,7 +100,11 @@ def _trade_warnings(traded: Sequence[NamedVerdict]) -> list[str]:
 
 
 def _misfit_warnings(
-    doubt: Uncertainty, residuals: Mapping[str, Mapping[str, Whiteness]], scored: Scored, converged: bool
+    doubt: Uncertainty,
+    residuals: Mapping[str, Mapping[str, Whiteness]],
+    scored: Scored,
+    converged: bool,
+    drifts: Mapping[str, float],
 ) -> list[str]:
     texts: list[str] = []
     coloured = sum(not test.white for tests in residuals.values() for test in tests.values())
@@ -106,12 +116,16 @@ def _misfit_warnings(
         )
     for name, (errors, _) in scored.validation_errors.items():
         train = scored.train_errors[name][0]
-        if errors.rms > VALIDATION_EXCESS * train.rms:
+        drift = drifts.get(name, 0.0)
+        unavoidable = float(np.hypot(1.0, drift)) * errors.rms / errors.noise_ratio if drift else 0.0
+        if errors.rms > VALIDATION_EXCESS * max(train.rms, unavoidable):
             texts.append(
                 f"{name}: the free run is {errors.rms / train.rms:.1f} times worse on validation than on training."
             )
     for name, (errors, _) in scored.train_errors.items():
-        if errors.noise_ratio > 2.0:
-            times = f"{errors.noise_ratio:.{0 if errors.noise_ratio >= 100 else 1}f}"
-            texts.append(f"{name}: the error of the free run is {times} times the noise floor.")
+        drift = drifts.get(name, 0.0)
+        ratio = errors.noise_ratio / float(np.hypot(1.0, drift))
+        if ratio > 2.0:
+            what = "what noise of its inputs makes of it" if drift > 1.0 else "the noise floor"
+            texts.append(f"{name}: the error of the free run is {ratio:.{0 if ratio >= 100 else 1}f} times {what}.")
     return texts

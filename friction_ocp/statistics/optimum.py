@@ -42,19 +42,21 @@ class Optimum:
     """Parameters that the gaps between segments are laid for, by name."""
     firsts: tuple[tuple[int, ...], ...] = ()
     """By recording the first nodes of its segments, where some were cut further than they were to begin with."""
+    tells_noise: bool = False
+    """Whether the noise of measured inputs is an unknown of every sample."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
         """Take the end of a fit, and what of its model was settled on the way, without its program."""
         settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model), model.found)
-        joined = not fits_free_run(model) and is_divided(model, fitted.program)
+        joined = not fits_free_run(model) and not model.tells_noise and is_divided(model, fitted.program)
         firsts = [tuple(cut.first.tolist()) for cut in fitted.program.segments] if joined else ()
-        return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts))
+        return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts), model.tells_noise)
 
     def settled(self, model: Model) -> Model:
         """Return the model with the integrator steps, the torque noise and the stamps that the fit ended with."""
         moved = with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
-        return laid_for(with_late(moved, self.late), self.found)
+        return dataclasses.replace(laid_for(with_late(moved, self.late), self.found), tells_noise=self.tells_noise)
 
     def fitted(self, model: Model) -> Fitted:
         """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
@@ -79,6 +81,7 @@ class Optimum:
             "late": {name: dict(item) for name, item in self.late.items()},
             "found": dict(self.found),
             "firsts": [list(first) for first in self.firsts],
+            "tells_noise": self.tells_noise,
             "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
@@ -105,7 +108,9 @@ class Optimum:
         }
         found = {name: float(value) for name, value in content["found"].items()}
         firsts = tuple(tuple(int(node) for node in first) for first in content["firsts"])
-        return cls(solution, loss, float(content["max_step"]), levels, moves, late, found, firsts)
+        return cls(
+            solution, loss, float(content["max_step"]), levels, moves, late, found, firsts, bool(content["tells_noise"])
+        )
 
 
 def _plain(level: NoiseLevel) -> dict[str, Any]:

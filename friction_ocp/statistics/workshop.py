@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any
 
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.preparation import prepare_identification
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.rounds import Fitted
-from friction_ocp.estimation.torque_noise import prepare_identification
 from friction_ocp.execution.content import fingerprint
 from friction_ocp.statistics.optimum import Optimum
 
