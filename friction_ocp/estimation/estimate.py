@@ -15,7 +15,7 @@ from friction_ocp.estimation.drive_noise import made_by_inputs, within
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.horizon import horizon
+from friction_ocp.estimation.horizon import horizon, longest_recording
 from friction_ocp.estimation.identifiability import Verdict, beyond_the_log, named_in_trades, verdicts
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.innovations import innovations
@@ -173,7 +173,7 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         residuals=residuals,
         curves=friction_curves(model, theta, doubt.covariance, simulation.train),
         warnings=(
-            *warnings_of(solution, parameters, doubt, residuals, simulation, _drifts(model, simulation)),
+            *warnings_of(solution, parameters, doubt, residuals, simulation, _drifts(model, simulation, white)),
             *(_missed_warning(fit) for fit in missed),
         ),
         solver=SolverFacts(
@@ -188,11 +188,17 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     )
 
 
-def _drifts(model: Model, simulation: Simulation) -> dict[str, float]:
-    """Return by channel how far noise of noisy inputs moves a free run, over the noise floor."""
-    if not model.noisy_inputs or simulation.horizon_s is None:
+def _drifts(model: Model, simulation: Simulation, white: bool) -> dict[str, float]:
+    """Return by channel how far noise of noisy inputs moves a free run, over the noise floor.
+
+    As far as it went where that noise, told sample by sample, leaves nothing else.
+    """
+    if not model.noisy_inputs:
         return {}
-    moved = np.sqrt(within(model, made_by_inputs(model), model.train[0], simulation.horizon_s)) / model.noise
+    if model.tells_noise and white:
+        return dict.fromkeys(model.drive.output_names, float("inf"))
+    seconds = longest_recording(model) if simulation.horizon_s is None else simulation.horizon_s
+    moved = np.sqrt(within(model, made_by_inputs(model), model.train[0], seconds)) / model.noise
     return dict(zip(model.drive.output_names, map(float, moved), strict=True))
 
 

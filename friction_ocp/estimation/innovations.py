@@ -37,7 +37,8 @@ def innovations(program: Program, point: Point, index: int) -> FloatArray:
             mean = advance[k - 1] @ mean + jumps[k - 1]
             covariance = advance[k - 1] @ covariance @ advance[k - 1].T + spread[k - 1]
             for state in np.flatnonzero(tied[k]):
-                row = np.where(np.arange(states) == state, tied[k, state], 0.0)
+                row = np.zeros(states)
+                row[state] = tied[k, state]
                 mean, covariance, _ = _updated(mean, covariance, row, float(row @ pulled[k]))
         for at in range(cut.first[k], ends[k]):
             for column in np.flatnonzero(np.isfinite(errors[at])):

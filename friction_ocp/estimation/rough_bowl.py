@@ -30,6 +30,8 @@ HARDLY = (0.0005, 0.0002)
 """Smoothing of the sign over the typical speed, for the nodes alone: an accelerometer sees every change of the sign,
 and wide smoothing leads astray."""
 NODE_STEPS = 8
+FEW = 2
+"""The same where nodes are to follow parameters, and not to find better ones."""
 STRIDE = 3.0
 """Standard errors to look about a point on either side: far enough for a bowl to show through its roughness."""
 KINK = 1.0
@@ -66,7 +68,7 @@ def _toward_bottom(model: Model, program: Program, point: Point, cost: float) ->
     if not np.any(away):
         return point
     for share in SHARES:
-        beside = _beside(model, program, point, share * away)
+        beside = _beside(model, program, point, share * away, NODE_STEPS)
         trial = _with_better(program, beside, _fresh(program, beside))
         if program.objective(trial) < cost - UNIMPORTANT:
             return trial
@@ -83,17 +85,17 @@ def _to_bottom(model: Model, program: Program, point: Point) -> FloatArray:
     axes, before = _axes(program, point), segment_costs(program, point)
     away = np.zeros(len(axes))
     for k, step in enumerate(axes):
-        sides = [segment_costs(program, _beside(model, program, point, side * step)) for side in (-STRIDE, STRIDE)]
+        sides = [segment_costs(program, _beside(model, program, point, side * step, FEW)) for side in (-STRIDE, STRIDE)]
         rises = [side - before for side in sides]
         low, high = (float(np.sum(rise, where=np.abs(rise) < KINK)) for rise in rises)
         away[k] = (low - high) / (2.0 * STRIDE)
     return np.asarray(away @ axes, dtype=np.float64)
 
 
-def _beside(model: Model, program: Program, point: Point, step: FloatArray) -> Point:
+def _beside(model: Model, program: Program, point: Point, step: FloatArray, steps: int) -> Point:
     """Return the point with other parameters, and the nodes that its own lead to there."""
     theta = model.space.clip(point.theta + step)
-    return solve_nodes(program, Point(theta, point.nodes), NODE_STEPS, NEGLIGIBLE)
+    return solve_nodes(program, Point(theta, point.nodes), steps, NEGLIGIBLE)
 
 
 def _axes(program: Program, point: Point) -> FloatArray:
