@@ -64,6 +64,7 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     told = _told(model, progress, phases) if model.noisy_inputs else None
     if told is not None:
         return refined(*told, phases)
+    model = replace(model, noisy_inputs=())
     model, fitted = synchronised(model, fit(model, progress), phases)
     if model.train:
         model, fitted = relaid(model, fitted, phases)

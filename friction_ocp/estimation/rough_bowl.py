@@ -70,7 +70,7 @@ def _toward_bottom(model: Model, program: Program, point: Point, cost: float) ->
     for share in SHARES:
         beside = _beside(model, program, point, share * away, NODE_STEPS)
         trial = _with_better(program, beside, _fresh(program, beside))
-        if program.objective(trial) < cost - UNIMPORTANT:
+        if program.objective(trial) < cost:
             return trial
     return point
 

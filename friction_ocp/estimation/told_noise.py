@@ -36,7 +36,7 @@ def _followed(model: Model, program: Program, starts: Sequence[FloatArray], phas
     """Return the best end that is found from some parameters."""
     watch = phases.begin("noise of every sample")
     ends = [solve_gauss_newton(program, begun(program, theta), WARM, watch) for theta in starts]
-    point = unstuck(model, program, min(ends, key=lambda end: end.objective).point, watch)
+    point = min((unstuck(model, program, end.point, watch) for end in ends), key=program.objective)
     watch = phases.begin("noise of every sample, steps of standard errors")
     point = stepped_out(model, program, point, watch)
     last = final_solver(model)(program, point, limits(model), watch)

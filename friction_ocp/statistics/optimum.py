@@ -56,7 +56,8 @@ class Optimum:
     def settled(self, model: Model) -> Model:
         """Return the model with the integrator steps, the torque noise and the stamps that the fit ended with."""
         moved = with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
-        return dataclasses.replace(laid_for(with_late(moved, self.late), self.found), tells_noise=self.tells_noise)
+        told = {"tells_noise": self.tells_noise, "noisy_inputs": model.noisy_inputs if self.tells_noise else ()}
+        return dataclasses.replace(laid_for(with_late(moved, self.late), self.found), **told)
 
     def fitted(self, model: Model) -> Fitted:
         """Return the fit with the program that it ended with: exact friction, the loss as it was; `model` settled."""
