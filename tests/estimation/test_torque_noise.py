@@ -12,8 +12,9 @@ from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Tra
 
 from friction_ocp import identify
 from friction_ocp.drive.parts import Channel as Sensor
+from friction_ocp.estimation.preparation import prepare_identification
 from friction_ocp.estimation.problem import SEGMENT, Problem
-from friction_ocp.estimation.torque_noise import SHORTEST, prepare_identification
+from friction_ocp.estimation.torque_noise import SHORTEST
 from friction_ocp.friction.static import CoulombViscous
 from friction_ocp.parameters import Free
 from friction_ocp.recording.recording import Channel, Recording
