@@ -46,12 +46,13 @@ def unknown_inputs(model: Model, noise: TorqueNoise, items: Sequence[Experiment]
     their inputs are.
     """
     first = model.train[0]
-    if not np.any(within(model, noise, first, SHORTEST * float(np.median(first.grid.dt))) > model.noise**2):
-        return ()
     turning = driving(model.problem.drive, noise.numbers[first.name])
     inputs = tuple(dict.fromkeys(channel.name for _, channel, _ in turning))
     short = sum(item.grid.time.size for item in items) <= MOST_SAMPLES
-    return inputs if short and _in_step(items, model, inputs) else ()
+    if not inputs or not short or not _in_step(items, model, inputs):
+        return ()
+    moved = within(model, noise, first, SHORTEST * float(np.median(first.grid.dt)))
+    return inputs if np.any(moved > model.noise**2) else ()
 
 
 def blurred(model: Model, noise: TorqueNoise) -> FloatArray:
