@@ -1,9 +1,7 @@
 """Models that leave no more than noise, fitted with the noise of their measured inputs as unknowns.
 
-Where the noise of a measured current moves a fine encoder within two samples by more than the encoder's own noise, a
-model is judged by how much it answers to noise that its machine does not answer to: gaps are laid for one inertia, and
-a rotor that is stated rightly looks too light. With the noise of every sample an unknown, none is favoured. But what
-misses much would call that noise: it is judged as before.
+With the noise of every sample an unknown, no model is favoured for answering less to noise that its machine does not
+answer to (`unknown_noise.py`). But what misses much would call that noise: it is judged as before.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
-from friction_ocp.estimation.unknown_noise import blurred, unknown_inputs
+from friction_ocp.estimation.unknown_noise import blurred, noise_rules, tellable_inputs
 from friction_ocp.simulation.grid import FloatArray
 
 
@@ -54,5 +52,7 @@ def sharpened(model: Model, foot: Footing) -> Footing:
     stated = bool(model.problem.estimation.process_noise)
     if foot.noisy_inputs or not foot.joined or stated:
         return foot
-    inputs = unknown_inputs(model, foot, foot.train)
-    return replace(foot, noise=blurred(model, foot), noisy_inputs=inputs) if inputs else foot
+    inputs = tellable_inputs(model, foot.train)
+    if not inputs or not noise_rules(model, foot):
+        return foot
+    return replace(foot, noise=blurred(model, foot), noisy_inputs=inputs)

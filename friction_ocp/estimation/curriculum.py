@@ -10,7 +10,7 @@ from friction_ocp.estimation.division import cut_at, divided, is_divided
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
 from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
-from friction_ocp.estimation.horizon import fits_free_run
+from friction_ocp.estimation.horizon import is_relaxed
 from friction_ocp.estimation.model import Model, laid_for
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
@@ -38,9 +38,7 @@ def enter_in_turn(model: Model) -> bool:
 
 def may_be_cut(model: Model, program: Program) -> bool:
     """Whether segments are relaxed, and cut where differences grow: where they have been, or would have been."""
-    if model.tells_noise:
-        return False
-    return not fits_free_run(model) and (is_divided(model, program) or enter_in_turn(model))
+    return is_relaxed(model) and (is_divided(model, program) or enter_in_turn(model))
 
 
 def introduced(model: Model, phases: Phases) -> tuple[Solution, Program]:

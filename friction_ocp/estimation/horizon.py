@@ -51,6 +51,11 @@ def fits_free_run(model: Model) -> bool:
     return chosen == "simulation" if chosen else horizon(model) is None
 
 
+def is_relaxed(model: Model) -> bool:
+    """Whether the fit is one of relaxed segments, which are cut as differences grow: not one sample each."""
+    return not model.tells_noise and not fits_free_run(model)
+
+
 def is_held(drive: Drive) -> bool:
     """Whether every shaft is tied, through transmissions, to something that keeps it from drifting."""
     held = {shaft.name for shaft in drive.shafts if shaft.gravity is not None}

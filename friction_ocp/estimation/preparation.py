@@ -19,7 +19,7 @@ from friction_ocp.estimation.torque_noise import (
     input_power,
     seen_variance,
 )
-from friction_ocp.estimation.unknown_noise import unknown_inputs
+from friction_ocp.estimation.unknown_noise import noise_rules, tellable_inputs
 
 WITHIN = 0.1
 """Variance that torque noise may add within a segment over that of a channel: it is taken for noise of its samples."""
@@ -37,7 +37,9 @@ def prepare_identification(problem: Problem) -> Model:
     if not model.train or options.fit == "simulation" or options.estimated_noise:
         return model
     plain = not options.process_noise and not options.segment and options.loss == "squares"
-    model = replace(model, noisy_inputs=unknown_inputs(model, made_by_inputs(model), model.train) if plain else ())
+    inputs = tellable_inputs(model, model.train) if plain else ()
+    if inputs and noise_rules(model, made_by_inputs(model)):
+        model = replace(model, noisy_inputs=inputs)
     if fits_free_run(model):
         return model
     model = _with_options(model, process_noise=dict(options.process_noise) or stated_input_noise(model))

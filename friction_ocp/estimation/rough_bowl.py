@@ -30,6 +30,7 @@ HARDLY = (0.0005, 0.0002)
 """Smoothing of the sign over the typical speed, for the nodes alone: an accelerometer sees every change of the sign,
 and wide smoothing leads astray."""
 NODE_STEPS = 8
+"""Of the nodes alone, at most."""
 FEW = 2
 """The same where nodes are to follow parameters, and not to find better ones."""
 STRIDE = 3.0

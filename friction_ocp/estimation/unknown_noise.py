@@ -39,20 +39,22 @@ MOST_SAMPLES = 30_000
 """Samples of all recordings together up to which the noise of each is an unknown: more cost time."""
 
 
-def unknown_inputs(model: Model, noise: TorqueNoise, items: Sequence[Experiment]) -> tuple[str, ...]:
-    """Return the inputs whose noise is to be an unknown of every sample of some recordings.
+def tellable_inputs(model: Model, items: Sequence[Experiment]) -> tuple[str, ...]:
+    """Return the inputs that turn motors, whose noise may be an unknown of every sample of some recordings.
 
-    None where it moves no channel by more than that shows itself, where recordings are too long or not sampled as
-    their inputs are.
+    None where recordings are too long or not sampled as their inputs are.
     """
-    first = model.train[0]
-    turning = driving(model.problem.drive, noise.numbers[first.name])
+    turning = driving(model.problem.drive, {})
     inputs = tuple(dict.fromkeys(channel.name for _, channel, _ in turning))
     short = sum(item.grid.time.size for item in items) <= MOST_SAMPLES
-    if not inputs or not short or not _in_step(items, model, inputs):
-        return ()
+    return inputs if short and _in_step(items, model, inputs) else ()
+
+
+def noise_rules(model: Model, noise: TorqueNoise) -> bool:
+    """Whether torque noise moves a channel, within the shortest segment, by more than the noise of its own."""
+    first = model.train[0]
     moved = within(model, noise, first, SHORTEST * float(np.median(first.grid.dt)))
-    return inputs if np.any(moved > model.noise**2) else ()
+    return bool(np.any(moved > model.noise**2))
 
 
 def blurred(model: Model, noise: TorqueNoise) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from friction_ocp.estimation.clocks import Moves
 from friction_ocp.estimation.division import cut_at, is_divided
 from friction_ocp.estimation.gauss_newton import Solution
-from friction_ocp.estimation.horizon import fits_free_run
+from friction_ocp.estimation.horizon import is_relaxed
 from friction_ocp.estimation.model import Model, laid_for, late_of, with_late, with_step
 from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.noise_level import with_levels
@@ -49,7 +49,7 @@ class Optimum:
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
         """Take the end of a fit, and what of its model was settled on the way, without its program."""
         settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model), model.found)
-        joined = not fits_free_run(model) and not model.tells_noise and is_divided(model, fitted.program)
+        joined = is_relaxed(model) and is_divided(model, fitted.program)
         firsts = [tuple(cut.first.tolist()) for cut in fitted.program.segments] if joined else ()
         return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts), model.tells_noise)
 
