@@ -12,11 +12,10 @@ import numpy as np
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.gap import acceleration_noise
 from friction_ocp.estimation.gathered_noise import motions_of, slopes_about, unit_covariances
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.noise import noise_floor
-from friction_ocp.estimation.torque_noise import QUARTERS, driving, input_power, seen_variance
+from friction_ocp.estimation.torque_noise import QUARTERS, acceleration_noise, driving, input_power, seen_variance
 from friction_ocp.simulation.grid import FloatArray
 
 NUMERICAL_INPUT = 1e-3

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
-from friction_ocp.estimation.drive_noise import made_by_inputs, within
+from friction_ocp.estimation.drive_noise import TorqueNoise, made_by_inputs, within
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
@@ -20,7 +20,7 @@ from friction_ocp.estimation.identifiability import Verdict, beyond_the_log, nam
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.innovations import innovations
 from friction_ocp.estimation.model import Model, prepare
-from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel
+from friction_ocp.estimation.noise import NoiseFloor, NoiseLevel, step_of
 from friction_ocp.estimation.preparation import prepare_identification
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.progress import Progress, Report, silent
@@ -29,8 +29,9 @@ from friction_ocp.estimation.sampling_limit import beyond_sampling
 from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simulate_recordings
 from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
+from friction_ocp.estimation.unknown_noise import MOST_SAMPLES
 from friction_ocp.estimation.warnings import warnings_of
-from friction_ocp.estimation.whiteness import Whiteness, whiteness
+from friction_ocp.estimation.whiteness import Whiteness, told_by_rounding, whiteness
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
@@ -152,7 +153,7 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     problem, solution = model.problem, fitted.solution
     theta = solution.point.theta
     found = influence(fitted.program, solution.point)
-    residuals = _residual_tests(fitted)
+    residuals = _residual_tests(model, fitted)
     simulation = simulate_model(model, theta)
     missed = [fit for fit in simulation.static if fit.split == "train" and misses_points(fit)]
     white = all(test.white for tests in residuals.values() for test in tests.values()) and not missed
@@ -189,17 +190,23 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
 
 
 def _drifts(model: Model, simulation: Simulation, white: bool) -> dict[str, float]:
-    """Return by channel how far noise of noisy inputs moves a free run, over the noise floor.
+    """Return by channel how far torque noise, or that of noisy inputs, moves a free run, over the noise floor.
 
-    As far as it went where that noise, told sample by sample, leaves nothing else.
+    As far as it went where that noise leaves nothing else.
     """
-    if not model.noisy_inputs:
+    if not model.noisy_inputs and not model.process_noise:
         return {}
-    if model.tells_noise and white:
+    if (model.tells_noise or model.process_noise) and white:
         return dict.fromkeys(model.drive.output_names, float("inf"))
     seconds = longest_recording(model) if simulation.horizon_s is None else simulation.horizon_s
-    moved = np.sqrt(within(model, made_by_inputs(model), model.train[0], seconds)) / model.noise
+    moved = np.sqrt(within(model, _wandering(model), model.train[0], seconds)) / model.noise
     return dict(zip(model.drive.output_names, map(float, moved), strict=True))
+
+
+def _wandering(model: Model) -> TorqueNoise:
+    """Return the torque noise that moves a free run: stated or estimated, or what noise of the inputs makes."""
+    made = made_by_inputs(model)
+    return replace(made, density=model.process_noise) if model.process_noise else made
 
 
 def _missed_warning(fit: StaticFit) -> str:
@@ -259,17 +266,29 @@ def _parameter_estimates(
     )
 
 
-def _residual_tests(fitted: Fitted) -> dict[str, dict[str, Whiteness]]:
+def _residual_tests(model: Model, fitted: Fitted) -> dict[str, dict[str, Whiteness]]:
+    """Test what is left; where noise joins nodes, which then are drawn to samples, what was not to be expected.
+
+    Samples of counters that tell nothing but their rounding are not asked.
+    """
     program, point = fitted.program, fitted.solution.point
+    is_short = sum(item.grid.time.size for item in program.experiments) <= MOST_SAMPLES
+    by_noise = program.drive.noisy_inputs or (model.process_noise and is_short)
     tests: dict[str, dict[str, Whiteness]] = {}
     for index, item in enumerate(program.experiments):
-        if program.drive.noisy_inputs and not program.segments[index].measured:
+        cut, predicted = program.segments[index], program.simulate(index, point).y
+        residuals = left = program.residuals(index, predicted)
+        if by_noise and cut.gap_weight is not None and not cut.measured and isinstance(program.loss, Squares):
             residuals = innovations(program, point, index)
-        else:
-            residuals = program.residuals(index, program.simulate(index, point).y)
         tests[item.name] = {}
-        for column, name in enumerate(program.drive.output_names):
+        for column, channel in enumerate(model.problem.drive.outputs):
             seen = np.isfinite(residuals[:, column])
+            step = step_of(channel, item.measured[np.isfinite(item.measured[:, column]), column])
+            if step is not None:
+                errors = left[:, column] * program.noise[column]
+                seen &= ~told_by_rounding(predicted[:, column], errors, step)
             if seen.sum() > 10:
-                tests[item.name][name] = whiteness(item.grid.time[seen], residuals[seen, column])
+                first, last = np.flatnonzero(seen)[[0, -1]]
+                asked = np.where(seen, residuals[:, column], np.nan)[first : last + 1]
+                tests[item.name][channel.name] = whiteness(item.grid.time[first : last + 1], asked)
     return tests

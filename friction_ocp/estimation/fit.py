@@ -13,12 +13,12 @@ from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, laid_for, late_of, with_late
 from friction_ocp.estimation.noise_level import most_likely, with_levels
 from friction_ocp.estimation.points_fit import fit_points
-from friction_ocp.estimation.preparation import joined_by_input_noise
+from friction_ocp.estimation.preparation import is_moved_by_inputs, joined_by_input_noise
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
-from friction_ocp.estimation.stages import WIDTHS, keeps_the_loss
+from friction_ocp.estimation.stages import WIDTHS, is_noise, keeps_the_loss
 from friction_ocp.estimation.starts import start_points
 from friction_ocp.estimation.synchronise import moves_of, synchronised, with_moves
 from friction_ocp.estimation.told_noise import with_told_noise
@@ -56,7 +56,8 @@ def fit(model: Model, progress: Progress = silent) -> Fitted:
 def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     """Fit, with clocks and torque noise where they are asked for, then shorten the integrator's steps where it matters.
 
-    Noise of measured inputs that rules is told sample by sample. Return the model with these stamps, levels and steps.
+    Noise of measured inputs that rules is told sample by sample; it joins segments where these leave more than noise
+    without it, and no more with it. Return the model with these stamps, levels and steps.
     Shorter steps move the kinks of exact friction, and what was the best end between them need not be it any more; nor
     need segments be cut where they should be.
     """
@@ -66,6 +67,8 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
         return refined(*told, phases)
     model = replace(model, noisy_inputs=())
     model, fitted = synchronised(model, fit(model, progress), phases)
+    if is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
+        model, fitted = _joined(model, progress, phases) or (model, fitted)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
     finer, fitted = refined(model, fitted, phases)
@@ -82,6 +85,13 @@ def _told(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitt
     seen, joined = synchronised(blunt, fit(blunt, progress), phases)
     as_seen = with_late(with_moves(model, moves_of(seen)), late_of(seen))
     return with_told_noise(as_seen, joined, phases)
+
+
+def _joined(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
+    """Fit on segments that noise of measured inputs joins; None where that leaves more than noise."""
+    blunt = joined_by_input_noise(model)
+    seen, fitted = synchronised(blunt, fit(blunt, progress), phases)
+    return (seen, fitted) if is_noise(fitted.program, fitted.solution) else None
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:

@@ -68,6 +68,8 @@ class Model:
     """Measured inputs whose noise moves a channel, within two samples, by more than the channel's own."""
     tells_noise: bool = False
     """Whether fits end with programs in which that noise is an unknown of every sample."""
+    joins_noise: bool = False
+    """Whether the noise of measured inputs, which is not stated, joins segments."""
 
     @property
     def nominal(self) -> FloatArray:

@@ -34,7 +34,8 @@ def gap_roots(
     """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
 
     Torque noise makes the states wander, more so where an input jumps between two samples; states that no noise
-    enters may jump by a share of the noise floor, and deflections by what torque noise makes of their torque.
+    enters may jump by a share of the noise floor, and by as much in sum where a segment is cut, and deflections by what
+    torque noise makes of their torque.
     `moving` holds the torque noise, and the inertias that it moves, where these are not those of `noise`. None of it
     moves a state where it is `told` from sample to sample.
     """
@@ -49,7 +50,8 @@ def gap_roots(
     units = unit_covariances(model, slopes[:-1], distinct)
     still = still_gaps(model, noise, item.name, float(np.median(spans)), slopes[-1], told)
     power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
-    covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + np.diag(still**2)
+    part = np.minimum(1.0, spans / np.median(spans))[:, None, None]
+    covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + part * np.diag(still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
 
 
@@ -84,6 +86,10 @@ def still_gaps(
         size[deflected] = np.clip(loose, size[deflected], LOOSE_GAP * model.state_scale[deflected])
     for k, channel in enumerate(mech.drive.outputs):
         group = mech.topology.group_of.get(channel.part)
+        if group is not None and channel.signal == "alpha" and group in mech.free_groups:
+            row = len(mech.angle_groups) + mech.free_groups.index(group)
+            shown = np.abs(shown_speed(mech, noise.numbers[recording], channel) * slopes[row])
+            size = np.minimum(size, NEGLIGIBLE_GAP * float(model.noise[k]) / np.maximum(shown, 1e-300))
         if group is None or channel.signal not in ("theta", "omega"):
             continue
         ratio = abs(shown_speed(mech, noise.numbers[recording], channel))

@@ -15,11 +15,12 @@ import scipy.optimize as _optimize  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.elimination import halved
 from friction_ocp.estimation.experiment import Experiment
-from friction_ocp.estimation.gap import RELATIVE_GAP, acceleration_noise, torque_covariance
+from friction_ocp.estimation.gap import RELATIVE_GAP
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.noise import LevelWord, NoiseLevel
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import cuts, relaxed
+from friction_ocp.estimation.torque_noise import acceleration_noise, torque_covariance
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 

@@ -8,18 +8,19 @@ import numpy as np
 
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.drive_noise import made_by_inputs, within
-from friction_ocp.estimation.gap import acceleration_noise, torque_covariance
-from friction_ocp.estimation.horizon import fits_free_run
+from friction_ocp.estimation.horizon import fits_free_run, is_relaxed
 from friction_ocp.estimation.model import Model, prepare_fit
 from friction_ocp.estimation.problem import SEGMENT, Problem
 from friction_ocp.estimation.torque_noise import (
     MOST_SEGMENTS,
     QUARTERS,
     SHORTEST,
+    acceleration_noise,
     input_power,
     seen_variance,
+    torque_covariance,
 )
-from friction_ocp.estimation.unknown_noise import noise_rules, tellable_inputs
+from friction_ocp.estimation.unknown_noise import MOST_SAMPLES, noise_rules, tellable_inputs
 
 WITHIN = 0.1
 """Variance that torque noise may add within a segment over that of a channel: it is taken for noise of its samples."""
@@ -49,8 +50,10 @@ def prepare_identification(problem: Problem) -> Model:
 def joined_by_input_noise(model: Model) -> Model:
     """Return a model of segments so short that noise of measured inputs moves channels the least, joined by it.
 
-    What it moves them by within a segment counts as noise of theirs.
+    What it moves them by within a segment counts as noise of theirs. A model that is joined so already stays.
     """
+    if model.joins_noise:
+        return model
     noise = made_by_inputs(model)
     model = _with_options(model, process_noise=noise.density, fit="relaxed")
     model = _with_options(model, segment=_longest(model))
@@ -61,7 +64,21 @@ def joined_by_input_noise(model: Model) -> Model:
         name: replace(floor, std=float(np.hypot(floor.std, np.sqrt(moved[name]))))
         for name, floor in model.floors.items()
     }
-    return replace(model, floors=floors)
+    return replace(model, floors=floors, joins_noise=True)
+
+
+def is_moved_by_inputs(model: Model) -> bool:
+    """Whether noise of measured inputs, which is not stated, moves a channel of relaxed segments by more than its own.
+
+    Not where recordings are so long that segments so short as to follow that noise take too much time.
+    """
+    options = model.problem.estimation
+    stated = model.process_noise or options.estimated_noise or options.segment
+    short = sum(item.grid.time.size for item in model.train) <= MOST_SAMPLES
+    if not model.train or not short or stated or options.loss != "squares" or not is_relaxed(model):
+        return False
+    seconds = options.samples * float(np.median(model.train[0].grid.dt))
+    return bool(np.any(within(model, made_by_inputs(model), model.train[0], seconds) > model.noise**2))
 
 
 def stated_input_noise(model: Model) -> dict[str, float]:

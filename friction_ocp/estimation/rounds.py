@@ -18,6 +18,7 @@ from friction_ocp.estimation.parameter_space import nested_space
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.release import released
+from friction_ocp.estimation.rough_bowl import stepped_out, unstuck
 from friction_ocp.estimation.stages import (
     WIDTHS,
     free_run,
@@ -38,6 +39,12 @@ LEAST = 1e-3
 """Decrease of the objective by three steps that is next to nothing, were the residuals noise."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
 """Smoothing of the sign for the released model: far below any Stribeck speed that matters."""
+DESCENT = (0.1, 0.03, 0.01, 0.003, 0.001)
+"""The same for segments that noise joins, which are short and stick or slide one by one: in steps through which the
+parameters follow, down to where smoothing hardly moves them."""
+ROUGH = 2.0
+"""Objective over that of noise up to which an end may stand on the rough bottom of the bowl: beyond it a model misses
+something, and no step of a standard error tells."""
 FINALISTS = 5
 """Starts that are followed to the end."""
 SAME = 0.01
@@ -119,6 +126,8 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
         if is_sound(model, ends[-1]):
             return ends
     simple = nested_space(model.problem, model.space)
+    if simple is model.space and conclusive and plan.builder is joined:
+        return _best_first([*ends, _descended(model, phases)])
     if simple is model.space:
         return _best_first([*ends, *_rounds(model, plan, _plain_starts(model, phases), "fit", phases)])
     exact = replace(plan, widths=RELEASED_WIDTHS)
@@ -130,6 +139,32 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
     nested = _rounds(inner, plan, _plain_starts(inner, phases), "simpler friction", phases)
     starts = released(model, simple, nested[0].solution.point.theta)
     return _best_first([*ends, *_rounds(model, exact, starts, "fit", phases)])
+
+
+def _descended(model: Model, phases: Phases) -> Fitted:
+    """Fit segments that noise joins, from plain starts with the sign sharpened little by little.
+
+    The exact sign takes the parameters over with fresh nodes, and with those that the smoothed one has led to.
+    """
+    points: list[Point] = []
+    iterations, rounds = 0, len(DESCENT) + 1
+    for number, width in enumerate(DESCENT):
+        program = joined(model, width, Squares())
+        points = points or [suggested_point(program, theta) for theta in _plain_starts(model, phases)]
+        watch = phases.begin(f"descent, round {number + 1} of {rounds}")
+        ends = race(program, points, COARSE, watch, solve_gauss_newton)
+        points = [ends[0].point]
+        iterations += sum(end.iterations for end in ends)
+    program = joined(model, 0.0, Squares())
+    watch = phases.begin(f"descent, round {rounds} of {rounds}")
+    points.append(suggested_point(program, points[0].theta))
+    exact = [unstuck(model, program, point, watch) for point in points]
+    end = race(program, exact, limits(model), watch, final_solver(model))[0]
+    if end.objective < ROUGH * 0.5 * program.samples:
+        watch = phases.begin("descent, steps of standard errors")
+        point, iterations = stepped_out(model, program, end.point, watch), iterations + end.iterations
+        end = final_solver(model)(program, point, limits(model), watch)
+    return Fitted(replace(end, iterations=end.iterations + iterations), program)
 
 
 def _best_first(ends: Sequence[Fitted]) -> list[Fitted]:

@@ -41,7 +41,8 @@ def with_moves(model: Model, moves: Moves) -> Model:
     if not moves:
         return model
     fresh = with_late(prepare(on_one_clock(model.problem, moves)), late_of(model))
-    kept = {"noise_levels": model.noise_levels, "noisy_inputs": model.noisy_inputs, "tells_noise": model.tells_noise}
+    names = ("noise_levels", "noisy_inputs", "tells_noise", "joins_noise", "floors")
+    kept = {name: getattr(model, name) for name in names}
     moved = replace(with_step(fresh, model.max_step), **kept)
     return replace(moved, space=moved.space.moved(model.space.guess))
 

@@ -67,3 +67,34 @@ def seen_variance(mech: Mechanism, numbers: Mapping[str, float], covariances: Fl
         if name in mean:
             added[k] = shown_speed(mech, numbers, channel) ** 2 * float(mean[name])
     return added
+
+
+def acceleration_noise(mech: Mechanism, densities: Mapping[str, float], numbers: FloatArray) -> FloatArray:
+    """Return the density of the acceleration noise of each group, referred to its first shaft, rad/s^2/sqrt(Hz).
+
+    `densities` of torque by shaft, N m/sqrt(Hz); `numbers` (parameters,) of the drive.
+    """
+    power = [ca.SX(0.0) for _ in mech.topology.roots]
+    for shaft, density in densities.items():
+        power[mech.topology.group_of[shaft]] += (density * mech.topology.speed_ratio[shaft]) ** 2
+    spread: list[ca.SX] = [ca.sqrt(power[k]) / ca.fmax(mech.inertia(k), 1e-300) for k in range(len(power))]
+    function = ca.Function("noise", [ca.vertcat(*mech.parameters.values())], [ca.vertcat(*spread)])
+    return np.asarray(function(numbers)).ravel()
+
+
+def torque_covariance(mech: Mechanism, still: FloatArray, noise: FloatArray, spans: FloatArray) -> FloatArray:
+    """Return (spans, states, states): `still` (states, states), and what accelerations of density `noise` add to it.
+
+    Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
+    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
+    """
+    covariance = np.tile(still, (spans.size, 1, 1))
+    position = {group: k for k, group in enumerate(mech.angle_groups)}
+    for k, group in enumerate(mech.free_groups):
+        v, q = len(mech.angle_groups) + k, position[group]
+        power = noise[group] ** 2 * spans
+        covariance[:, v, v] += power
+        covariance[:, q, q] += power * spans**2 / 3.0
+        covariance[:, q, v] += power * spans / 2.0
+        covariance[:, v, q] += power * spans / 2.0
+    return covariance

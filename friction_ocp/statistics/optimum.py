@@ -16,6 +16,7 @@ from friction_ocp.estimation.horizon import is_relaxed
 from friction_ocp.estimation.model import Model, laid_for, late_of, with_late, with_step
 from friction_ocp.estimation.noise import NoiseLevel
 from friction_ocp.estimation.noise_level import with_levels
+from friction_ocp.estimation.preparation import joined_by_input_noise
 from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.rounds import Fitted, program_builder
 from friction_ocp.estimation.synchronise import moves_of, with_moves
@@ -44,6 +45,8 @@ class Optimum:
     """By recording the first nodes of its segments, where some were cut further than they were to begin with."""
     tells_noise: bool = False
     """Whether the noise of measured inputs is an unknown of every sample."""
+    joins_noise: bool = False
+    """Whether that noise, which is not stated, joins segments."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:
@@ -51,10 +54,11 @@ class Optimum:
         settled = (model.max_step, model.noise_levels, moves_of(model), late_of(model), model.found)
         joined = is_relaxed(model) and is_divided(model, fitted.program)
         firsts = [tuple(cut.first.tolist()) for cut in fitted.program.segments] if joined else ()
-        return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts), model.tells_noise)
+        return cls(fitted.solution, fitted.program.loss, *settled, tuple(firsts), model.tells_noise, model.joins_noise)
 
     def settled(self, model: Model) -> Model:
         """Return the model with the integrator steps, the torque noise and the stamps that the fit ended with."""
+        model = joined_by_input_noise(model) if self.joins_noise else model
         moved = with_moves(with_levels(with_step(model, self.max_step), self.noise_levels), self.moves)
         told = {"tells_noise": self.tells_noise, "noisy_inputs": model.noisy_inputs if self.tells_noise else ()}
         return dataclasses.replace(laid_for(with_late(moved, self.late), self.found), **told)
@@ -83,6 +87,7 @@ class Optimum:
             "found": dict(self.found),
             "firsts": [list(first) for first in self.firsts],
             "tells_noise": self.tells_noise,
+            "joins_noise": self.joins_noise,
             "noise_levels": [_plain(item) for item in self.noise_levels],
             "loss": {"name": type(self.loss).__name__, **dataclasses.asdict(self.loss)},  # pyright: ignore[reportArgumentType]
         }
@@ -109,9 +114,8 @@ class Optimum:
         }
         found = {name: float(value) for name, value in content["found"].items()}
         firsts = tuple(tuple(int(node) for node in first) for first in content["firsts"])
-        return cls(
-            solution, loss, float(content["max_step"]), levels, moves, late, found, firsts, bool(content["tells_noise"])
-        )
+        told = {name: bool(content[name]) for name in ("tells_noise", "joins_noise")}
+        return cls(solution, loss, float(content["max_step"]), levels, moves, late, found, firsts, **told)
 
 
 def _plain(level: NoiseLevel) -> dict[str, Any]:

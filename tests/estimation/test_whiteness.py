@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 from regressions import autoregressive
 
-from friction_ocp.estimation.whiteness import SIGNIFICANCE, whiteness
+from friction_ocp.estimation.whiteness import SIGNIFICANCE, told_by_rounding, whiteness
 
 TIME = 0.005 * np.arange(600)
 FALSE_ALARM = 1e-4
@@ -51,3 +51,35 @@ def test_lags_are_in_seconds_and_the_band_is_that_of_white_noise() -> None:
     assert test.lag_s[:3] == pytest.approx([0.005, 0.010, 0.015])
     assert test.band == pytest.approx(1.96 / np.sqrt(TIME.size))
     assert np.mean(np.abs(test.autocorrelation) < test.band) > 0.9
+
+
+def counted(speed: float, noise: float, misfit: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is predicted of a counter of unit steps, and what it shows less that."""
+    rng, samples = np.random.default_rng(seed), np.arange(3000)
+    predicted = speed * samples
+    shown = np.round(predicted + noise * rng.standard_normal(samples.size) + misfit * np.sin(samples / 30.0))
+    return predicted, shown - predicted
+
+
+@pytest.mark.parametrize("speed", [0.07, 1.26, 2.49])
+def test_errors_of_rounding_at_a_steady_speed_tell_nothing(speed: float) -> None:
+    """A right model leaves them, in a pattern that the speed makes of them."""
+    predicted, residual = counted(speed, 0.0, 0.0, 1)
+    assert not whiteness(np.arange(residual.size), residual).white
+    assert told_by_rounding(predicted, residual, 1.0).mean() > 0.95
+
+
+@pytest.mark.parametrize("misfit", [0.7, 3.0])
+def test_what_a_model_misses_is_told_from_rounding(misfit: float) -> None:
+    """Residuals that are larger than rounding makes them count, at a steady speed too."""
+    predicted, residual = counted(1.26, 0.0, misfit, 1)
+    asked = ~told_by_rounding(predicted, residual, 1.0)
+    assert asked.mean() > 0.95
+    assert not whiteness(np.arange(residual.size), np.where(asked, residual, np.nan)).white
+
+
+def test_where_other_noise_moves_a_counter_all_samples_count() -> None:
+    """Noise of two counts leaves nothing of the pattern, and errors larger than those of rounding."""
+    predicted, residual = counted(1.26, 2.0, 0.0, 1)
+    assert not told_by_rounding(predicted, residual, 1.0).any()
+    assert whiteness(np.arange(residual.size), residual).white
