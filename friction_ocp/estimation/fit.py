@@ -62,13 +62,17 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     need segments be cut where they should be.
     """
     phases = Phases(progress, EXPECTED_PHASES * model.problem.estimation.starts)
-    told = _told(model, progress, phases) if model.noisy_inputs else None
-    if told is not None:
-        return refined(*told, phases)
-    model = replace(model, noisy_inputs=())
-    model, fitted = synchronised(model, fit(model, progress), phases)
-    if is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
-        model, fitted = _joined(model, progress, phases) or (model, fitted)
+    rules = bool(model.noisy_inputs)
+    known = _by_input_noise(model, progress, phases) if rules else None
+    if known is not None and known[0].tells_noise:
+        return refined(*known, phases)
+    if known is not None:
+        model, fitted = known
+    else:
+        model = replace(model, noisy_inputs=())
+        model, fitted = synchronised(model, fit(model, progress), phases)
+        if not rules and is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
+            model, fitted = _by_input_noise(model, progress, phases) or (model, fitted)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
     finer, fitted = refined(model, fitted, phases)
@@ -79,19 +83,19 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     return relaid(finer, fitted, phases, CUTS)
 
 
-def _told(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
-    """Fit with the noise of noisy inputs as unknowns; None where that leaves more than noise."""
+def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
+    """Fit on segments that noise of measured inputs joins, and with that of noisy inputs as unknowns of every sample.
+
+    Return the last that leaves no more than noise; None where both leave more.
+    """
     blunt = joined_by_input_noise(replace(model, tells_noise=False))
     seen, joined = synchronised(blunt, fit(blunt, progress), phases)
-    as_seen = with_late(with_moves(model, moves_of(seen)), late_of(seen))
-    return with_told_noise(as_seen, joined, phases)
-
-
-def _joined(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
-    """Fit on segments that noise of measured inputs joins; None where that leaves more than noise."""
-    blunt = joined_by_input_noise(model)
-    seen, fitted = synchronised(blunt, fit(blunt, progress), phases)
-    return (seen, fitted) if is_noise(fitted.program, fitted.solution) else None
+    if model.noisy_inputs:
+        as_seen = with_late(with_moves(model, moves_of(seen)), late_of(seen))
+        told = with_told_noise(as_seen, joined, phases)
+        if told is not None:
+            return told
+    return (replace(seen, noisy_inputs=()), joined) if is_noise(joined.program, joined.solution) else None
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:
