@@ -47,6 +47,7 @@ def moved(bench: Bench, factor: float) -> Bench:
     return bench.at(FittedModel(fitted.model, fitted.footing, linear_program(program, point)))
 
 
+@pytest.mark.slow
 def test_a_fit_that_is_not_the_best_is_bettered(bench: Bench) -> None:
     """From beside the optimum it is found; the optimum itself stays as it is."""
     beside = moved(bench, 1.01)

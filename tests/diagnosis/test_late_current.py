@@ -49,6 +49,7 @@ def write(folder: Path, *outputs: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outputs", [pytest.param(("position", "speed"), marks=pytest.mark.slow), ("position",)])
 def test_a_late_current_is_found_at_the_current(tmp_path: Path, outputs: tuple[str, ...]) -> None:
     """It is one delay, not one of every sensor that shows the future."""

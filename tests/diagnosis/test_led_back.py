@@ -50,6 +50,7 @@ def test_a_scale_of_the_only_encoder_goes_back_to_one(tmp_path: Path) -> None:
     np.testing.assert_allclose(back, base.theta, rtol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [True, False])
 def test_a_way_out_of_where_a_fit_was_caught_is_no_effect(tmp_path: Path, first: bool) -> None:
     """The search goes on from the better fit without it; that is the base model's where nothing was added before."""

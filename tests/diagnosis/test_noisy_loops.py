@@ -21,6 +21,7 @@ UNBALANCE = 0.05
 """N m."""
 
 
+@pytest.mark.slow
 def test_the_noise_of_a_loop_is_no_gap(tmp_path: Path) -> None:
     """A model that is right explains the recordings; the file that is written is driven as the diagnosis was."""
     result = diagnosed(written(tmp_path))

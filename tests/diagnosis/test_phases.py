@@ -88,6 +88,7 @@ def pushed(phase: float) -> Plant:
     return replace(plain, shafts=(shaft,))
 
 
+@pytest.mark.slow
 def test_a_disturbance_does_not_wait_for_recordings(tmp_path: Path) -> None:
     """Found with a phase for each; that of the recording held out is its own, and is kept beside it."""
     path = written(tmp_path, tuple(map(pushed, (0.3, 2.1, 4.0))), ("periodic_disturbance", "cogging", "stribeck"))
@@ -142,6 +143,7 @@ def test_cogging_is_found_behind_an_encoder_that_begins_at_zero(tmp_path: Path) 
         assert np.sign(values["motor.cogging.cosine"]) * np.cos(angle) > 0.95
 
 
+@pytest.mark.slow
 def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path) -> None:
     """A constant torque of each recording: on the one held out it is estimated as its start is, and said."""
     torques = (0.02, -0.03, 0.05)

@@ -59,6 +59,7 @@ def test_nodes_that_are_variables_stay_where_a_point_has_them(path: Path) -> Non
         np.testing.assert_array_equal(own, placed)
 
 
+@pytest.mark.slow
 def test_predictions_tell_what_is_missing(path: Path) -> None:
     """A search on them ends at the effect of the plant, its size near the truth."""
     problem = load_problem(path)

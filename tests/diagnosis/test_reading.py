@@ -31,6 +31,7 @@ def found(folder: Path, **friction: object) -> Diagnosis:
     return diagnose(load_problem(path))
 
 
+@pytest.mark.slow
 def test_a_held_input_is_no_delay(tmp_path: Path) -> None:
     """A model that lacks nothing has no gap; that its input is held is said beside what is assumed."""
     seen = found(tmp_path)

@@ -78,6 +78,7 @@ def test_a_rival_takes_the_place_of_what_stood_in_for_it(tmp_path: Path) -> None
     assert again[2] == kept and again[0] is after.current
 
 
+@pytest.mark.slow
 def test_a_more_general_shape_goes_with_the_effect_to_another_place(tmp_path: Path) -> None:
     """The same effect elsewhere has all of its shape; another effect does not take it on."""
     bench = open_bench(load_problem(write_case(tmp_path, axis(), effects=("cogging", "asymmetry"))), HERE)
@@ -157,6 +158,7 @@ def test_rivals_are_weighed_again_beside_what_came_later(first: str, tmp_path: P
     assert sum(told[0].choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
 
 
+@pytest.mark.slow
 def test_what_may_grow_is_no_rival_of_itself(tmp_path: Path) -> None:
     """Cogging, which may have overtones, keeps its probability when it is weighed again beside Stribeck friction."""
     plant = axis(law="stribeck", tau_s=1.5 * COULOMB, omega_s=6.0)

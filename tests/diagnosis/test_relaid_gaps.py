@@ -81,6 +81,7 @@ def write(folder: Path) -> Path:
     return written(folder, plant, SECONDS, current, {"channels": channels, "more": named})
 
 
+@pytest.mark.slow
 def test_a_rough_fit_with_a_light_rotor_leaves_no_wide_gaps(tmp_path: Path) -> None:
     """Loosely joined segments take the rotor for twenty times as light, which torque noise would move as far."""
     fitted = fit_base(prepare(load_problem(write(tmp_path))))
@@ -136,6 +137,7 @@ def write_late(folder: Path) -> Path:
     return written(folder, plant, 12.0, swings, changes)
 
 
+@pytest.mark.slow
 def test_gaps_are_not_laid_for_a_rotor_that_is_far_from_what_is_stated(tmp_path: Path) -> None:
     """A late speed makes the rotor as light as torque noise needs to explain it: its gaps would explain all else."""
     fitted = fit_base(prepare(load_problem(write_late(tmp_path))))

@@ -21,6 +21,7 @@ from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
 
 
+@pytest.mark.slow
 def test_rivals_that_were_set_up_elsewhere_say_the_same(tmp_path: Path) -> None:
     """What goes to another process makes the same runs, and the same evidence of them."""
     problem = load_problem(write_case(tmp_path, axis(law="stribeck", tau_s=0.15, omega_s=6.0)))
