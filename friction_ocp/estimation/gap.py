@@ -10,23 +10,35 @@ from friction_ocp.estimation.drive_noise import TorqueNoise, input_impulses
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.torque_noise import acceleration_noise, torque_covariance
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 RELATIVE_GAP = 0.05
 """Standard deviation of a gap over the typical size of its state, where no process noise is stated."""
+DETERMINISTIC_GAP = 1e-4
+"""The same for states that no noise enters: bristles, currents, the memory of a controller."""
 AT_ONCE = 0.01
 """Share of a recording up to which a piece of it begins with it."""
-COLD = 1e-4
-"""Standard deviation of how far friction has warmed up where a recording starts, over its typical size."""
+BRISTLE_GAP = 0.01
+"""The same for bristles."""
 
 
 def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
-    """Return (segments - 1, states, states) W with W'W the inverse covariance of each gap."""
+    """Return (segments - 1, states, states) W with W'W the inverse covariance of each gap.
+
+    Segments that noise of inputs joins are short, and what no noise enters must not wander from one to the next; those
+    that are cut by the user, for a torque noise of his, are long, and a fit leans on what little all states may jump.
+    """
+    durations = np.diff(item.grid.time[first])[:-1]
     if not model.process_noise:
-        return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (len(first) - 2, 1, 1))
-    numbers = model.space.numbers_by_path(model.nominal, item.name)
-    noise = TorqueNoise(model.process_noise, {item.name: numbers})
-    return gap_roots(model, noise, item, first, input_impulses(model, item, numbers))
+        return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
+    if model.joins_noise:
+        numbers = model.space.numbers_by_path(model.nominal, item.name)
+        noise = TorqueNoise(model.process_noise, {item.name: numbers})
+        return gap_roots(model, noise, item, first, input_impulses(model, item, numbers))
+    shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
+    roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
+    return np.asarray(roots, dtype=np.float64)
 
 
 def start_weight(model: Model, item: Experiment) -> FloatArray:
@@ -40,5 +52,23 @@ def start_weight(model: Model, item: Experiment) -> FloatArray:
     if TIME in names:
         gone = float(item.grid.at_node[0, names.index(TIME)]) / float(item.grid.time[-1] - item.grid.time[0])
         cold = np.array([name.endswith(WARMTH) and gone < AT_ONCE for name in model.drive.state_names], dtype=bool)
-        weight[cold] /= COLD
+        weight[cold] /= DETERMINISTIC_GAP
     return weight
+
+
+def gap_covariance(model: Model, item: Experiment, spans: FloatArray, shares: FloatArray | float = 1.0) -> FloatArray:
+    """Return (spans, states, states) the covariances that torque noise gathers over `spans` s in angles and speeds.
+
+    Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
+    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2). What no noise enters may jump a little over a segment,
+    and by as much in sum where it is cut: `shares` of a segment are the spans.
+    """
+    bristle = np.array([".friction.z" in name for name in model.drive.state_names])
+    still = np.diag((np.where(bristle, BRISTLE_GAP, DETERMINISTIC_GAP) * model.state_scale) ** 2)
+    part = still * np.broadcast_to(shares, spans.shape)[:, None, None]
+    return torque_covariance(model.drive.mechanism, part, _group_noise(model, item), spans)
+
+
+def _group_noise(model: Model, item: Experiment) -> FloatArray:
+    numbers = model.space.numbers(model.nominal, item.name)
+    return acceleration_noise(model.drive.mechanism, model.process_noise, numbers)

@@ -69,7 +69,7 @@ class Model:
     tells_noise: bool = False
     """Whether fits end with programs in which that noise is an unknown of every sample."""
     joins_noise: bool = False
-    """Whether the noise of measured inputs, which is not stated, joins segments."""
+    """Whether the noise of measured inputs joins segments, and no torque noise that is stated."""
 
     @property
     def nominal(self) -> FloatArray:

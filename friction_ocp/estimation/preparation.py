@@ -44,6 +44,7 @@ def prepare_identification(problem: Problem) -> Model:
     if fits_free_run(model):
         return model
     model = _with_options(model, process_noise=dict(options.process_noise) or stated_input_noise(model))
+    model = replace(model, joins_noise=bool(model.process_noise) and not options.process_noise)
     return model if options.segment or not model.process_noise else _with_options(model, segment=_longest(model))
 
 

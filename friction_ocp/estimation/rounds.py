@@ -126,7 +126,7 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
         if is_sound(model, ends[-1]):
             return ends
     simple = nested_space(model.problem, model.space)
-    if simple is model.space and conclusive and plan.builder is joined:
+    if simple is model.space and conclusive and model.joins_noise:
         return _best_first([*ends, _descended(model, phases)])
     if simple is model.space:
         return _best_first([*ends, *_rounds(model, plan, _plain_starts(model, phases), "fit", phases)])

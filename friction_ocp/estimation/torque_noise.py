@@ -86,9 +86,9 @@ def torque_covariance(mech: Mechanism, still: FloatArray, noise: FloatArray, spa
     """Return (spans, states, states): `still` (states, states), and what accelerations of density `noise` add to it.
 
     Torque noise of density q N m/sqrt(Hz) on an inertia J makes the speed a random walk: var(v) = q^2 T / J^2,
-    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2).
+    cov(q, v) = q^2 T^2 / (2 J^2), var(q) = q^2 T^3 / (3 J^2). `still` may differ by span: (spans, states, states).
     """
-    covariance = np.tile(still, (spans.size, 1, 1))
+    covariance = np.broadcast_to(still, (spans.size, *still.shape[-2:])).copy()
     position = {group: k for k, group in enumerate(mech.angle_groups)}
     for k, group in enumerate(mech.free_groups):
         v, q = len(mech.angle_groups) + k, position[group]

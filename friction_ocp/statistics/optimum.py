@@ -46,7 +46,7 @@ class Optimum:
     tells_noise: bool = False
     """Whether the noise of measured inputs is an unknown of every sample."""
     joins_noise: bool = False
-    """Whether that noise, which is not stated, joins segments."""
+    """Whether that noise joins segments."""
 
     @classmethod
     def of(cls, model: Model, fitted: Fitted) -> Optimum:

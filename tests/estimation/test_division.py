@@ -12,6 +12,7 @@ from friction_ocp.drive.parts import Gravity
 from friction_ocp.estimation.division import GROWTH, divided
 from friction_ocp.estimation.drive_noise import TorqueNoise
 from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
+from friction_ocp.estimation.gap import gap_covariance
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.node_gaps import gap_roots
 from friction_ocp.estimation.program import Point, Program
@@ -79,6 +80,15 @@ def test_the_motion_goes_through_the_new_nodes() -> None:
 
 def test_a_cut_allows_no_more_noise() -> None:
     """Gaps of the parts add up to the gap of the whole in what no noise enters."""
+    model = model_with(0.0)
+    item, none = model.train[0], np.zeros(1)
+    whole = gap_covariance(model, item, none)[0]
+    parts = gap_covariance(model, item, np.zeros(4), np.array([0.1, 0.2, 0.3, 0.4])).sum(axis=0)
+    assert parts == pytest.approx(whole)
+
+
+def test_a_cut_of_segments_that_noise_joins_allows_no_more() -> None:
+    """The same where gaps hold what a drive makes of its noise."""
     model = model_with(0.0)
     item, numbers = model.train[0], model.space.numbers_by_path(model.space.guess, model.train[0].name)
     whole = np.arange(0, 8 * SAMPLES, SAMPLES)

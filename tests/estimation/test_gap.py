@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from axes import INERTIA, axis, problem, two_masses
 
-from friction_ocp.estimation.gap import RELATIVE_GAP, gap_weights
+from friction_ocp.estimation.gap import DETERMINISTIC_GAP, RELATIVE_GAP, gap_covariance, gap_weights
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.stages import cuts
 from friction_ocp.parameters import Free
 
@@ -19,10 +20,15 @@ DISCRETE = 1e-3
 """Relative error of noise that changes only every SPAN / STEPS seconds."""
 
 
+def joined(stated: Problem) -> Model:
+    """Return the model of a problem as if its torque noise were that of inputs."""
+    return replace(prepare(stated), joins_noise=True)
+
+
 @pytest.fixture(scope="module")
 def model() -> Model:
     """One shaft with torque noise."""
-    return prepare(problem(axis(inertia=Free(INERTIA)), process_noise={"motor": DENSITY}))
+    return joined(problem(axis(inertia=Free(INERTIA)), process_noise={"motor": DENSITY}))
 
 
 def summed(density: float, inertia: float) -> np.ndarray:
@@ -60,7 +66,7 @@ def test_each_segment_has_the_noise_of_its_length(model: Model) -> None:
 
 def test_without_stated_noise_a_gap_is_a_share_of_its_state(model: Model) -> None:
     """The default says how far a state may jump, whatever the length of the segment."""
-    quiet = replace(model, problem=problem(axis(inertia=Free(INERTIA))))
+    quiet = replace(model, joins_noise=False, problem=problem(axis(inertia=Free(INERTIA))))
     weights = gap_weights(quiet, model.train[0], cuts(model.train[0], 120))
     assert weights[0] == pytest.approx(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)))
 
@@ -68,6 +74,25 @@ def test_without_stated_noise_a_gap_is_a_share_of_its_state(model: Model) -> Non
 def test_noise_behind_a_rigid_gear_counts_by_its_ratio() -> None:
     """On the first shaft both torque noise and inertia of the second appear divided by the ratio, once and twice."""
     ratio, load = 10.0, 0.3
-    geared = prepare(problem(two_masses(None, ratio), process_noise={"motor": DENSITY, "load": 20 * DENSITY}))
+    geared = joined(problem(two_masses(None, ratio), process_noise={"motor": DENSITY, "load": 20 * DENSITY}))
     density = np.hypot(DENSITY, 20 * DENSITY / ratio)
     assert gathered(geared) == pytest.approx(summed(density, INERTIA + load / ratio**2), rel=DISCRETE)
+
+
+def test_stated_torque_noise_makes_the_speed_a_random_walk(model: Model) -> None:
+    """The closed form is the sum of independent kicks and what they become in the angle."""
+    rounding = np.diag((DETERMINISTIC_GAP * model.state_scale) ** 2)
+    covariance = gap_covariance(model, model.train[0], np.array([SPAN]))[0] - rounding
+    assert covariance == pytest.approx(summed(DENSITY, INERTIA), rel=DISCRETE)
+
+
+def test_weights_make_gaps_white(model: Model) -> None:
+    """W'W is the inverse of the covariance over the length of each segment, where torque noise is stated."""
+    item, model = model.train[0], replace(model, joins_noise=False)
+    first = cuts(item, 120)
+    weights = gap_weights(model, item, first)
+    spans = np.diff(item.grid.time[first])[:-1]
+    assert len(weights) == len(first) - 2
+    for weight, span in zip(weights, spans, strict=True):
+        whitened = weight @ gap_covariance(model, item, np.array([span]))[0] @ weight.T
+        assert whitened == pytest.approx(np.eye(2), abs=1e-9)

@@ -49,7 +49,7 @@ def test_the_direct_way_counts_where_it_ends_best(model: Model, monkeypatch: pyt
     monkeypatch.setattr(rounds, "final_solver", chosen)
     ends = staged(model, Plan(joined, WIDTHS[1:], True), Phases(silent, 1))
     objectives = [fitted.solution.objective for fitted in ends]
-    assert len(seen) == 1 + len(rounds.DESCENT) + 1
+    assert len(seen) == 1 + len(WIDTHS[1:])
     assert objectives[0] == seen[0]
     assert objectives == sorted(objectives) and len(objectives) > 1
 
@@ -64,8 +64,8 @@ def test_starts_that_lead_to_one_end_are_followed_once(model: Model, monkeypatch
         return race(program, points, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(rounds, "race", counted)
-    staged(model, Plan(joined, WIDTHS[1:], False), Phases(silent, 1))
-    assert counts == [2, 1]
+    staged(model, Plan(joined, WIDTHS[1:], True), Phases(silent, 1))
+    assert counts == [1, 2, 1]
 
 
 def test_ends_that_differ_are_all_followed() -> None:
