@@ -39,8 +39,17 @@ class TorqueNoise:
 
 def made_by_inputs(model: Model) -> TorqueNoise:
     """Return the torque noise that noise of measured inputs makes, at what gaps between segments are laid for."""
-    numbers = {use.name: model.space.numbers_by_path(model.nominal, use.name) for use in model.problem.recordings}
+    numbers = _nominal_numbers(model)
     return TorqueNoise(_input_density(model, numbers[model.train[0].name]), numbers)
+
+
+def joining(model: Model) -> TorqueNoise:
+    """Return the torque noise that segments of a model are joined by, at what their gaps are laid for."""
+    return TorqueNoise(model.process_noise, _nominal_numbers(model))
+
+
+def _nominal_numbers(model: Model) -> dict[str, dict[str, float]]:
+    return {use.name: model.space.numbers_by_path(model.nominal, use.name) for use in model.problem.recordings}
 
 
 def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:

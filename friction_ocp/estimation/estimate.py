@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.curves import FrictionCurve, friction_curves
-from friction_ocp.estimation.drive_noise import TorqueNoise, made_by_inputs, within
+from friction_ocp.estimation.drive_noise import joining, made_by_inputs, within
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import Solution
@@ -199,14 +199,9 @@ def _drifts(model: Model, simulation: Simulation, white: bool) -> dict[str, floa
     if (model.tells_noise or model.process_noise) and white:
         return dict.fromkeys(model.drive.output_names, float("inf"))
     seconds = longest_recording(model) if simulation.horizon_s is None else simulation.horizon_s
-    moved = np.sqrt(within(model, _wandering(model), model.train[0], seconds)) / model.noise
+    noise = joining(model) if model.process_noise else made_by_inputs(model)
+    moved = np.sqrt(within(model, noise, model.train[0], seconds)) / model.noise
     return dict(zip(model.drive.output_names, map(float, moved), strict=True))
-
-
-def _wandering(model: Model) -> TorqueNoise:
-    """Return the torque noise that moves a free run: stated or estimated, or what noise of the inputs makes."""
-    made = made_by_inputs(model)
-    return replace(made, density=model.process_noise) if model.process_noise else made
 
 
 def _missed_warning(fit: StaticFit) -> str:

@@ -86,7 +86,8 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
 def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
     """Fit on segments that noise of measured inputs joins, and with that of noisy inputs as unknowns of every sample.
 
-    Return the last that leaves no more than noise; None where both leave more.
+    Return the last that leaves no more than noise; None where both leave more. A problem whose inputs state their noise
+    is fitted on such segments whatever these leave.
     """
     blunt = joined_by_input_noise(replace(model, tells_noise=False))
     seen, joined = synchronised(blunt, fit(blunt, progress), phases)
@@ -95,7 +96,9 @@ def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[M
         told = with_told_noise(as_seen, joined, phases)
         if told is not None:
             return told
-    return (replace(seen, noisy_inputs=()), joined) if is_noise(joined.program, joined.solution) else None
+    if model.joins_noise or is_noise(joined.program, joined.solution):
+        return replace(seen, noisy_inputs=()), joined
+    return None
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:

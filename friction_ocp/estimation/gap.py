@@ -6,7 +6,7 @@ import numpy as np
 
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import WARMTH
-from friction_ocp.estimation.drive_noise import TorqueNoise, input_impulses
+from friction_ocp.estimation.drive_noise import input_impulses, joining
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.node_gaps import gap_roots
@@ -33,9 +33,8 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     if not model.process_noise:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
     if model.joins_noise:
-        numbers = model.space.numbers_by_path(model.nominal, item.name)
-        noise = TorqueNoise(model.process_noise, {item.name: numbers})
-        return gap_roots(model, noise, item, first, input_impulses(model, item, numbers))
+        noise = joining(model)
+        return gap_roots(model, noise, item, first, input_impulses(model, item, noise.numbers[item.name]))
     shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)

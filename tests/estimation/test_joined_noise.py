@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission, Trajectory
+from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission
+from swinging import swung
 
 from friction_ocp.estimation.estimate import Estimate, conclude
 from friction_ocp.estimation.fit import settled
@@ -17,7 +18,7 @@ from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.rounds import Fitted
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
-from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.recording.recording import Recording
 from friction_ocp.statistics.optimum import Optimum
 
 TRUTH = {
@@ -48,11 +49,7 @@ def record(name: str, seed: int) -> Recording:
             PlantSensor("acceleration", "load.alpha", STEP, noise_std=2.0),
         ),
     )
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, SECONDS + 1.0, STEP)
-    waves = [np.sin(2 * np.pi * f * time + rng.uniform(0.0, 6.0)) for f in (0.7, 1.9, 4.3)]
-    run = plant.simulate(SECONDS, {"drive.current": Trajectory(time, 0.9 * np.sum(waves, axis=0), "linear")}, rng)
-    return Recording(name, {key: Channel(key, *run.channels[key], unit) for key, unit in UNITS.items()})
+    return swung(name, plant, (0.7, 1.9, 4.3), SECONDS, STEP, UNITS, seed)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission, Trajectory
+from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, PlantTransmission
+from swinging import swung
 
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.estimate import identify
@@ -23,7 +24,7 @@ from friction_ocp.estimation.rounds import program_builder
 from friction_ocp.estimation.whiteness import whiteness
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
-from friction_ocp.recording.recording import Channel, Recording
+from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.losses import Squares
 
 TRUTH = {
@@ -55,11 +56,7 @@ def record(name: str, seed: int) -> Recording:
             PlantSensor("output", "load.theta", STEP, resolution=RESOLUTION / 5.0),
         ),
     )
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, SECONDS + 1.0, STEP)
-    waves = [np.sin(2 * np.pi * f * time + rng.uniform(0.0, 6.0)) for f in (0.4, 0.9, 2.1)]
-    run = plant.simulate(SECONDS, {"drive.current": Trajectory(time, 0.9 * np.sum(waves, axis=0), "linear")}, rng)
-    return Recording(name, {key: Channel(key, *run.channels[key], unit) for key, unit in UNITS.items()})
+    return swung(name, plant, (0.4, 0.9, 2.1), SECONDS, STEP, UNITS, seed)
 
 
 @pytest.fixture(scope="module")
