@@ -283,7 +283,6 @@ def _residual_tests(model: Model, fitted: Fitted) -> dict[str, dict[str, Whitene
                 errors = left[:, column] * program.noise[column]
                 seen &= ~told_by_rounding(predicted[:, column], errors, step)
             if seen.sum() > 10:
-                first, last = np.flatnonzero(seen)[[0, -1]]
-                asked = np.where(seen, residuals[:, column], np.nan)[first : last + 1]
-                tests[item.name][channel.name] = whiteness(item.grid.time[first : last + 1], asked)
+                asked = np.where(seen, residuals[:, column], np.nan)
+                tests[item.name][channel.name] = whiteness(item.grid.time, asked)
     return tests
