@@ -64,14 +64,17 @@ def moved_share(program: Program, other: Program) -> float:
     return moved / max(sum(cut.count + its.count for cut, its in pairs), 1)
 
 
-def are_alike(program: Program, other: Program, share: float) -> bool:
-    """Whether two programs are cut alike and their gaps differ by less than a share of their size."""
+def are_alike(program: Program, other: Program, theta: FloatArray, share: float) -> bool:
+    """Whether two programs are cut alike and their gaps differ by less than a share of their size.
+
+    At parameters `theta` (parameters,), which these follow in both or in none.
+    """
     for cut, before in zip(program.segments, other.segments, strict=True):
-        if not np.array_equal(cut.first, before.first):
+        if not np.array_equal(cut.first, before.first) or (cut.slopes is None) != (before.slopes is None):
             return False
         if cut.gap_weight is None or before.gap_weight is None or not cut.gap_weight.size:
             continue
-        ratio = np.linalg.solve(before.gap_weight.transpose(0, 2, 1), cut.gap_weight.transpose(0, 2, 1))
+        ratio = np.linalg.solve(before.weights(theta).transpose(0, 2, 1), cut.weights(theta).transpose(0, 2, 1))
         if np.max(np.abs(ratio - np.eye(ratio.shape[-1]))) > share:
             return False
     return True

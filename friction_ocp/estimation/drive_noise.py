@@ -39,17 +39,28 @@ class TorqueNoise:
 
 def made_by_inputs(model: Model) -> TorqueNoise:
     """Return the torque noise that noise of measured inputs makes, at what gaps between segments are laid for."""
-    numbers = _nominal_numbers(model)
+    numbers = _numbers_at(model, model.nominal)
     return TorqueNoise(_input_density(model, numbers[model.train[0].name]), numbers)
 
 
-def joining(model: Model) -> TorqueNoise:
-    """Return the torque noise that segments of a model are joined by, at what their gaps are laid for."""
-    return TorqueNoise(model.process_noise, _nominal_numbers(model))
+def joining(model: Model, theta: FloatArray | None = None) -> TorqueNoise:
+    """Return the torque noise that segments of a model are joined by, at parameters `theta` (parameters,).
+
+    None are what its gaps are laid for. What noise of inputs makes is as much as their torque constants, which may be
+    fitted, have changed since the guesses.
+    """
+    numbers = _numbers_at(model, model.nominal if theta is None else theta)
+    if not model.joins_noise:
+        return TorqueNoise(model.process_noise, numbers)
+    first, noise = model.train[0].name, partial(input_noise, model)
+    before = input_power(model.problem.drive, model.space.numbers_by_path(model.space.guess, first), noise)
+    now = input_power(model.problem.drive, numbers[first], noise)
+    grown = {shaft: float(np.sqrt(now[shaft] / max(power, 1e-300))) for shaft, power in before.items()}
+    return TorqueNoise({key: grown.get(key, 1.0) * value for key, value in model.process_noise.items()}, numbers)
 
 
-def _nominal_numbers(model: Model) -> dict[str, dict[str, float]]:
-    return {use.name: model.space.numbers_by_path(model.nominal, use.name) for use in model.problem.recordings}
+def _numbers_at(model: Model, theta: FloatArray) -> dict[str, dict[str, float]]:
+    return {use.name: model.space.numbers_by_path(theta, use.name) for use in model.problem.recordings}
 
 
 def torque_noise(model: Model, numbers: Mapping[str, float]) -> dict[str, float]:

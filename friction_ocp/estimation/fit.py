@@ -7,6 +7,7 @@ from dataclasses import replace
 from friction_ocp.estimation.curriculum import may_be_cut
 from friction_ocp.estimation.detours import detour, hop
 from friction_ocp.estimation.division import are_alike, divided_afresh, moved_share, reweighed
+from friction_ocp.estimation.gap import following
 from friction_ocp.estimation.growth import drifting
 from friction_ocp.estimation.horizon import fits_free_run, horizon, is_held, longest_recording
 from friction_ocp.estimation.kept_loss import fit_kept
@@ -18,6 +19,7 @@ from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
 from friction_ocp.estimation.rounds import Fitted, Plan, final_solver, joined, limits, staged, windowed
+from friction_ocp.estimation.short_cut import through_short_segments
 from friction_ocp.estimation.stages import WIDTHS, is_noise, keeps_the_loss
 from friction_ocp.estimation.starts import start_points
 from friction_ocp.estimation.synchronise import moves_of, synchronised, with_moves
@@ -71,6 +73,7 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
     else:
         model = replace(model, noisy_inputs=())
         model, fitted = synchronised(model, fit(model, progress), phases)
+        fitted = through_short_segments(model, fitted, phases)
         if not rules and is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
             model, fitted = _by_input_noise(model, progress, phases) or (model, fitted)
     if model.train:
@@ -124,7 +127,8 @@ def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple
             if turn < CUTS or all(moved_share(afresh, other) > SETTLED for other in known):
                 program, point = afresh, there
                 known.append(afresh)
-        if are_alike(program, fitted.program, SETTLED):
+        program = following(model, program)
+        if are_alike(program, fitted.program, point.theta, SETTLED):
             return model, Fitted(replace(fitted.solution, objective=program.objective(point)), program)
         watch = phases.begin(f"gaps between segments, turn {turn + 1}")
         end = final_solver(model)(program, point, limits(model), watch)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from friction_ocp.drive.inputs import TIME
@@ -9,7 +11,9 @@ from friction_ocp.drive.mechanism import WARMTH
 from friction_ocp.estimation.drive_noise import input_impulses, joining
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.node_gaps import gap_roots, gap_slopes
+from friction_ocp.estimation.program import Program
+from friction_ocp.estimation.segments import GapSlopes, Segments
 from friction_ocp.estimation.torque_noise import acceleration_noise, torque_covariance
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
@@ -17,6 +21,8 @@ RELATIVE_GAP = 0.05
 """Standard deviation of a gap over the typical size of its state, where no process noise is stated."""
 DETERMINISTIC_GAP = 1e-4
 """The same for states that no noise enters: bristles, currents, the memory of a controller."""
+STEP = 1e-3
+"""Relative change of a parameter over which the weight of a gap is differentiated."""
 AT_ONCE = 0.01
 """Share of a recording up to which a piece of it begins with it."""
 BRISTLE_GAP = 0.01
@@ -38,6 +44,32 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
     shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)
+
+
+def following(model: Model, program: Program) -> Program:
+    """Return a program with gaps that follow the parameters where noise of measured inputs joins its segments.
+
+    What a machine has done does not hang on noise that its meters add, and what such noise would do to a model weighs
+    against its residuals: the lighter its rotor, the more. With gaps of one size a lighter rotor would only pay for
+    moving more, and the heavier one would be found (errors in variables; Fuller 1987, section 3.1).
+    """
+    if not model.joins_noise or model.tells_noise:
+        return program
+    theta = model.nominal
+    steps = np.where(theta == 0.0, STEP, STEP * np.abs(theta))
+    moves = np.diag(steps)
+    sides = [(joining(model, theta - move), joining(model, theta + move)) for move in moves]
+    noise = joining(model)
+
+    def one(item: Experiment, cut: Segments) -> Segments:
+        if cut.gap_weight is None or cut.count < 2:
+            return cut
+        impulses = input_impulses(model, item, noise.numbers[item.name])
+        by_theta = gap_slopes(model, noise, item, cut.first, impulses, sides, steps)
+        return replace(cut, slopes=GapSlopes(theta, by_theta))
+
+    pairs = zip(program.experiments, program.segments, strict=True)
+    return replace(program, segments=tuple(one(item, cut) for item, cut in pairs))
 
 
 def start_weight(model: Model, item: Experiment) -> FloatArray:

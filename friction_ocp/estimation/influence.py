@@ -106,7 +106,8 @@ def _of_recording(
     if cut.gap_weight is not None and cut.count > 1:
         flat = program.gap_errors(index, point, result.end).ravel()
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
-        moved = np.einsum("kij,kjp->kip", cut.gap_weight, moved + result.dend[:-1, :, states:] @ slope)
+        moved = cut.weights(point.theta) @ (moved + result.dend[:-1, :, states:] @ slope)
+        moved += cut.weighed_slopes(result.end[:-1] - point.nodes[index][1:], point.theta.size)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
         parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
     if program.drive.noisy_inputs:

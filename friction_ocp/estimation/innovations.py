@@ -26,7 +26,7 @@ def innovations(program: Program, point: Point, index: int) -> FloatArray:
     slopes = result.dy[:, :, :states] / program.noise[:, None]
     errors = -program.residuals(index, result.y)
     advance, jumps = result.dend[:-1, :, :states], result.end[:-1] - nodes[1:]
-    roots = np.asarray(np.linalg.inv(cut.gap_weight), dtype=np.float64)
+    roots = np.asarray(np.linalg.inv(cut.weights(point.theta)), dtype=np.float64)
     spread: FloatArray = roots @ roots.transpose(0, 2, 1)
     tied, pulled = _ties(program, index, point)
     ends = np.append(cut.first[1:-1], len(errors))

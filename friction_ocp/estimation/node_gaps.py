@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,19 +39,74 @@ def gap_roots(
     `moving` holds the torque noise, and the inertias that it moves, where these are not those of `noise`. None of it
     moves a state where it is `told` from sample to sample.
     """
-    mover = replace(noise, density={}) if told else noise if moving is None else moving
-    spans = np.diff(item.grid.time[first])
-    states = len(model.drive.state_names)
-    if spans.size < 2:
+    if len(first) < 3:
+        states = len(model.drive.state_names)
         return np.zeros((0, states, states))
-    numbers = leaf_numbers(model, noise, item.name)
-    distinct, motions, which = alike(spans, motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2))
-    slopes = slopes_about(model, numbers, np.concatenate([motions, np.zeros((1, states))]))
-    units = unit_covariances(model, slopes[:-1], distinct)
-    still = still_gaps(model, noise, item.name, float(np.median(spans)), slopes[-1], told)
+    mover = replace(noise, density={}) if told else noise if moving is None else moving
+    return _roots(model, noise, item, first, impulses, mover, _ground(model, noise, item, first, told))
+
+
+def gap_slopes(
+    model: Model,
+    noise: TorqueNoise,
+    item: Experiment,
+    first: IntArray,
+    impulses: Mapping[str, FloatArray],
+    sides: Sequence[tuple[TorqueNoise, TorqueNoise]],
+    steps: FloatArray,
+) -> FloatArray:
+    """Return (gaps, states, states, parameters) derivatives of the roots of gaps by the parameters.
+
+    `sides` hold the torque noise, and the numbers that it moves, with each parameter less and more by its step of
+    `steps` (parameters,): central differences, about the motion that `noise` has and with the jumps of states that no
+    noise enters.
+    """
+    ground = _ground(model, noise, item, first, told=False)
+
+    def roots(side: TorqueNoise) -> FloatArray:
+        return _roots(model, side, item, first, impulses, side, ground)
+
+    slopes = [(roots(more) - roots(less)) / (2.0 * step) for (less, more), step in zip(sides, steps, strict=True)]
+    return np.stack(slopes, axis=-1)
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What gaps are laid about."""
+
+    spans: FloatArray
+    """(kinds,) s of segments that are alike."""
+    motions: FloatArray
+    """(kinds, states) how these move."""
+    which: IntArray
+    """(segments,) the kind of each."""
+    still: FloatArray
+    """(states,) how far those may jump that no noise enters."""
+
+
+def _ground(model: Model, noise: TorqueNoise, item: Experiment, first: IntArray, told: bool) -> _Ground:
+    numbers, spans = leaf_numbers(model, noise, item.name), np.diff(item.grid.time[first])
+    kinds = alike(spans, motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2))
+    at_rest = slopes_about(model, numbers, np.zeros((1, len(model.drive.state_names))))[0]
+    return _Ground(*kinds, still_gaps(model, noise, item.name, float(np.median(spans)), at_rest, told))
+
+
+def _roots(
+    model: Model,
+    noise: TorqueNoise,
+    item: Experiment,
+    first: IntArray,
+    impulses: Mapping[str, FloatArray],
+    mover: TorqueNoise,
+    ground: _Ground,
+) -> FloatArray:
+    spans = np.diff(item.grid.time[first])
+    slopes = slopes_about(model, leaf_numbers(model, noise, item.name), ground.motions)
+    units = unit_covariances(model, slopes, ground.spans)
     power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
     part = np.minimum(1.0, spans / np.median(spans))[:, None, None]
-    covariance: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which]) + part * np.diag(still**2)
+    gathered: FloatArray = np.einsum("gs,gsij->sij", power, units[:, ground.which])
+    covariance = gathered + part * np.diag(ground.still**2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
 
 

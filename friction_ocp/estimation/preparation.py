@@ -68,17 +68,24 @@ def joined_by_input_noise(model: Model) -> Model:
     return replace(model, floors=floors, joins_noise=True)
 
 
-def is_moved_by_inputs(model: Model) -> bool:
-    """Whether noise of measured inputs, which is not stated, moves a channel of relaxed segments by more than its own.
+def may_be_joined_by_inputs(model: Model) -> bool:
+    """Whether relaxed segments may as well be short ones that noise of measured inputs joins, which nobody states.
 
-    Not where recordings are so long that segments so short as to follow that noise take too much time.
+    Not where recordings are so long that these take too much time.
     """
     options = model.problem.estimation
     stated = model.process_noise or options.estimated_noise or options.segment
     short = sum(item.grid.time.size for item in model.train) <= MOST_SAMPLES
     if not model.train or not short or stated or options.loss != "squares" or not is_relaxed(model):
         return False
-    seconds = options.samples * float(np.median(model.train[0].grid.dt))
+    return any(density > 0.0 for density in made_by_inputs(model).density.values())
+
+
+def is_moved_by_inputs(model: Model) -> bool:
+    """Whether noise of measured inputs, not stated, moves a channel of relaxed segments by more than its own."""
+    if not may_be_joined_by_inputs(model):
+        return False
+    seconds = model.problem.estimation.samples * float(np.median(model.train[0].grid.dt))
     return bool(np.any(within(model, made_by_inputs(model), model.train[0], seconds) > model.noise**2))
 
 

@@ -270,7 +270,7 @@ class Program:
 
     def gap_errors(self, index: int, point: Point, end: FloatArray) -> FloatArray:
         """Return (gaps, states) how far segments end from where the next begin, over what torque noise allows."""
-        return self.segments[index].weighed(end[:-1] - point.nodes[index][1:])
+        return self.segments[index].weighed(end[:-1] - point.nodes[index][1:], point.theta)
 
     def start_errors(self, index: int, point: Point) -> FloatArray:
         """Return (tied, states) how far tied nodes are from what was measured, over their deviations."""
@@ -339,22 +339,26 @@ class Program:
         system = NormalEquations.empty(cut.count, states, count)
         system.cost += float(np.sum(score.cost))
         system.add_squares(slice(0, cut.count), score.square, score.gradient, slope)
-        self._add_gaps(cut, nodes, result, slope, system)
+        self._add_gaps(index, point, result, slope, system)
         self._add_start(index, point, start_slope, system)
         blocks = Blocks(system.node_node, system.node_next, system.node_theta, system.node_gradient)
         return system.cost, system.theta_theta, system.theta_gradient, blocks
 
     def _add_gaps(
-        self, cut: Segments, nodes: FloatArray, result: SweepResult, slope: FloatArray, system: NormalEquations
+        self, index: int, point: Point, result: SweepResult, slope: FloatArray, system: NormalEquations
     ) -> None:
+        cut, nodes = self.segments[index], point.nodes[index]
         if cut.gap_weight is None or cut.count < 2:
             return
         assert result.dend is not None
-        weight, states = cut.gap_weight, nodes.shape[1]
+        weight, states, jumps = cut.weights(point.theta), nodes.shape[1], result.end[:-1] - nodes[1:]
         before, after = slice(0, cut.count - 1), slice(1, cut.count)
-        gap = cut.weighed(result.end[:-1] - nodes[1:])
+        gap = np.einsum("kij,kj->ki", weight, jumps)
         jacobian = weight @ result.dend[:-1]
         system.cost += 0.5 * float(np.sum(gap**2))
+        if cut.slopes is not None and len(slope):
+            jacobian = np.concatenate([jacobian, cut.weighed_slopes(jumps, point.theta.size)], axis=2)
+            slope = np.concatenate([slope, np.eye(point.theta.size)])
         system.add(before, jacobian, gap, np.ones(gap.shape), slope)
         back = weight.transpose(0, 2, 1)
         system.node_next -= jacobian[:, :, :states].transpose(0, 2, 1) @ weight

@@ -9,10 +9,12 @@ import numpy as np
 from friction_ocp.estimation.curriculum import may_be_cut
 from friction_ocp.estimation.division import divided_afresh
 from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.gap import following
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.progress import Phases
+from friction_ocp.estimation.rough_bowl import unstuck
 from friction_ocp.estimation.rounds import Fitted, limits
 from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
@@ -28,7 +30,8 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
 
     The first step follows from the fastest mode of the drive; that it suffices for the noise of these recordings shows
     only now: one Gauss-Newton step on half the integrator step may not move a parameter by more than SHIFT. How short
-    they have to be is found at the fit with the first ones, and fitted once.
+    they have to be is found at the fit with the first ones, and fitted once. Segments that noise joins stick or slide
+    elsewhere with them.
     """
     if model.problem.estimation.max_step is not None or isinstance(fitted.program.loss, Absolute):
         return model, fitted
@@ -44,7 +47,10 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
         return model, fitted
     if may_be_cut(model, program):
         program, point = divided_afresh(model, program, point)
+        program = following(model, program)
     watch = phases.begin(f"integrator step {model.max_step:.2g} s")
+    if model.joins_noise:
+        point = unstuck(model, program, point, watch)
     end = solve_gauss_newton(program, point, limits(model), watch)
     return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
 

@@ -35,6 +35,7 @@ from friction_ocp.simulation.losses import AbstractLoss, Squares
 
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances(inner=4)
+SMOOTH = replace(FINE, max_iterations=30)
 LEAST = 1e-3
 """Decrease of the objective by three steps that is next to nothing, were the residuals noise."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)
@@ -144,20 +145,25 @@ def staged(model: Model, plan: Plan, phases: Phases) -> list[Fitted]:
 def _descended(model: Model, phases: Phases) -> Fitted:
     """Fit segments that noise joins, from plain starts with the sign sharpened little by little.
 
-    The exact sign takes the parameters over with fresh nodes, and with those that the smoothed one has led to.
+    The exact sign takes the parameters over of the smoothing that fits best, with fresh nodes, and with those that the
+    last has led to. Noise keeps a slow shaft from knowing its sign, and on average its friction is a smoothed one; what
+    is sharper makes every sample stick or slide, and parameters stay wherever that has left them.
     """
     points: list[Point] = []
+    led: list[Solution] = []
     iterations, rounds = 0, len(DESCENT) + 1
     for number, width in enumerate(DESCENT):
         program = joined(model, width, Squares())
         points = points or [suggested_point(program, theta) for theta in _plain_starts(model, phases)]
         watch = phases.begin(f"descent, round {number + 1} of {rounds}")
-        ends = race(program, points, COARSE, watch, solve_gauss_newton)
+        ends = race(program, points, SMOOTH, watch, solve_gauss_newton)
         points = [ends[0].point]
+        led.append(ends[0])
         iterations += sum(end.iterations for end in ends)
     program = joined(model, 0.0, Squares())
     watch = phases.begin(f"descent, round {rounds} of {rounds}")
-    points.append(suggested_point(program, points[0].theta))
+    best = min(led, key=lambda end: end.objective)
+    points.append(suggested_point(program, best.point.theta))
     exact = [unstuck(model, program, point, watch) for point in points]
     end = race(program, exact, limits(model), watch, final_solver(model))[0]
     if end.objective < ROUGH * 0.5 * program.samples:

@@ -10,6 +10,16 @@ from friction_ocp.simulation.grid import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
+class GapSlopes:
+    """How the weights of the gaps of a recording hang on the parameters."""
+
+    theta: FloatArray
+    """(parameters,) those that the weights are laid for."""
+    by_theta: FloatArray
+    """(segments - 1, states, states, parameters)."""
+
+
+@dataclass(frozen=True)
 class Segments:
     """How one recording is cut."""
 
@@ -22,6 +32,8 @@ class Segments:
     """How many nodes, from the first, are no variables but what the smoothed measurement says."""
     start_weight: FloatArray | None = None
     """(segments, states) 1 / standard deviation of the prior on each node, about what the smoothed measurement says."""
+    slopes: GapSlopes | None = None
+    """Of the weights; None where these are the same whatever the parameters are."""
 
     @property
     def count(self) -> int:
@@ -39,8 +51,22 @@ class Segments:
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(np.any(self.start_weight > 0, axis=1))
 
-    def weighed(self, gaps: FloatArray) -> FloatArray:
+    def weights(self, theta: FloatArray) -> FloatArray:
+        """Return (gaps, states, states) the weights of the gaps under some parameters."""
+        if self.gap_weight is None or self.count < 2:
+            return np.zeros((0, 0, 0))
+        if self.slopes is None:
+            return self.gap_weight
+        return self.gap_weight + self.slopes.by_theta @ (theta - self.slopes.theta)
+
+    def weighed(self, gaps: FloatArray, theta: FloatArray) -> FloatArray:
         """Return gaps (segments - 1, states) over what is allowed; none where the segments are unconnected."""
         if self.gap_weight is None or self.count < 2:
             return np.zeros((0, gaps.shape[1]))
-        return np.einsum("kij,kj->ki", self.gap_weight, gaps)
+        return np.einsum("kij,kj->ki", self.weights(theta), gaps)
+
+    def weighed_slopes(self, gaps: FloatArray, count: int) -> FloatArray:
+        """Return (gaps, states, parameters) how weighed gaps change with `count` parameters through their weights."""
+        if self.slopes is None:
+            return np.zeros((*gaps.shape, count))
+        return np.einsum("kijp,kj->kip", self.slopes.by_theta, gaps)

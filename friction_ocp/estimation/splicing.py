@@ -27,7 +27,7 @@ def spliced(program: Program, point: Point, other: Point) -> Point:
     for index, cut in enumerate(program.segments):
         mine, own = point.nodes[index].copy(), _costs(program, index, point)
         theirs, rival = other.nodes[index], _costs(program, index, other)
-        for begin, stop in _stretches(_differ(cut, mine, theirs)):
+        for begin, stop in _stretches(_differ(cut, mine, theirs, point.theta)):
             at, gaps = slice(begin, stop), slice(begin, stop + 1)
             before = float(np.sum(own[0][at]) + np.sum(own[1][gaps]))
             after = float(np.sum(rival[0][at]) + np.sum(rival[1][gaps]))
@@ -70,11 +70,11 @@ def _costs(program: Program, index: int, point: Point) -> tuple[FloatArray, Floa
     return np.add.reduceat(np.sum(costs, axis=1), cut.first[:-1]), gaps
 
 
-def _differ(cut: Segments, nodes: FloatArray, others: FloatArray) -> BoolArray:
+def _differ(cut: Segments, nodes: FloatArray, others: FloatArray, theta: FloatArray) -> BoolArray:
     """Return (segments,) whether two sets of nodes differ by more than a gap between segments may."""
     if cut.gap_weight is None or cut.count < 2:
         return np.any(nodes != others, axis=1)
-    beyond = np.linalg.norm(cut.weighed(nodes[1:] - others[1:]), axis=1) > APART
+    beyond = np.linalg.norm(cut.weighed(nodes[1:] - others[1:], theta), axis=1) > APART
     return np.concatenate([beyond[:1], beyond])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from friction_ocp.estimation.clocks import Moves
 from friction_ocp.estimation.division import cut_at, is_divided
+from friction_ocp.estimation.gap import following
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.horizon import is_relaxed
 from friction_ocp.estimation.model import Model, laid_for, late_of, with_late, with_step
@@ -68,7 +69,7 @@ class Optimum:
         program = program_builder(model)(model, 0.0, self.loss)
         if self.firsts:
             program = cut_at(model, program, [np.array(first, dtype=np.int64) for first in self.firsts])
-        return Fitted(self.solution, program)
+        return Fitted(self.solution, following(model, program))
 
     def document(self) -> dict[str, Any]:
         """Return plain values; an objective that is not finite becomes None."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ NOISE, RESOLUTION = 0.02, 2.0 * np.pi / 2**13
 UNITS = {"current": "A", "encoder": "rad", "acceleration": "rad/s^2"}
 
 
-def record(name: str, seed: int) -> Recording:
+def record(name: str, seed: int, noise: float = NOISE) -> Recording:
     """Swing a load behind an elastic gear to and fro by a current of three sines."""
     motor = PlantShaft("motor", 2e-4, PlantFriction("coulomb_viscous", tau_c=0.04, viscous=2e-4))
     load = PlantShaft("load", 0.012, PlantFriction("coulomb_viscous", tau_c=0.4, viscous=0.03))
@@ -44,7 +45,7 @@ def record(name: str, seed: int) -> Recording:
         transmissions=(PlantTransmission("motor", "load", RATIO, 150.0, 0.09),),
         motors=(PlantMotor("drive", "motor", torque_constant=TORQUE_CONSTANT),),
         sensors=(
-            PlantSensor("current", "drive.current", STEP, noise_std=NOISE),
+            PlantSensor("current", "drive.current", STEP, noise_std=noise),
             PlantSensor("encoder", "motor.theta", STEP, resolution=RESOLUTION),
             PlantSensor("acceleration", "load.alpha", STEP, noise_std=2.0),
         ),
@@ -55,9 +56,13 @@ def record(name: str, seed: int) -> Recording:
 @pytest.fixture(scope="module")
 def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     """A problem whose model is right, but for its numbers."""
-    folder = tmp_path_factory.mktemp("joined")
+    return problem_in(tmp_path_factory.mktemp("joined"), NOISE, 2e-4)
+
+
+def problem_in(folder: Path, noise: float, inertia: float | dict[str, float]) -> Problem:
+    """Return the problem of recordings with some noise of the current; `inertia` of the motor is known or fitted."""
     for k, name in enumerate(("one", "two", "three")):
-        write_recording(record(name, 30 + k), folder / f"{name}.h5")
+        write_recording(record(name, 30 + k, noise), folder / f"{name}.h5")
 
     def friction(guess: float, viscous: float) -> dict[str, Any]:
         return {"law": "coulomb_viscous", "tau_c": {"guess": guess, "min": 0}, "viscous": viscous}
@@ -68,7 +73,7 @@ def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
         "drive": {
             "motor": {"torque_constant": TORQUE_CONSTANT},
             "shafts": [
-                {"name": "motor", "inertia": 2e-4, "friction": friction(0.03, 2e-4)},
+                {"name": "motor", "inertia": inertia, "friction": friction(0.03, 2e-4)},
                 {"name": "load", "inertia": {"guess": 0.01, "min": 0.001}, "friction": friction(0.28, 0.03)},
             ],
             "transmissions": [{"ratio": RATIO, **joint}],
@@ -111,6 +116,18 @@ def test_the_drive_is_found(estimate: Estimate) -> None:
     for item in estimate.parameters:
         assert item.std_error < 0.05 * TRUTH[item.name], item.name
         assert abs(item.value - TRUTH[item.name]) < 4.0 * item.std_error, item.name
+
+
+@pytest.mark.slow
+def test_noise_of_a_meter_does_not_make_a_rotor_heavy(tmp_path: Path) -> None:
+    """What an ammeter adds moves no rotor: three times the noise leaves inertias and friction where they are."""
+    rotor = {"guess": 1.6e-4, "min": 2e-5}
+    noisy = conclude(*settled(prepare_identification(problem_in(tmp_path, 3.0 * NOISE, rotor))), 0.0, 0.0)
+    assert noisy.converged
+    for item in noisy.parameters:
+        wanted = {**TRUTH, "motor.inertia": 2e-4}[item.name]
+        assert item.std_error < 0.05 * wanted, item.name
+        assert abs(item.value - wanted) < 3.0 * item.std_error, item.name
 
 
 @pytest.mark.slow

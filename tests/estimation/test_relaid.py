@@ -70,8 +70,12 @@ def test_gaps_are_those_of_the_answer(answers: list[tuple[Model, Fitted]]) -> No
     for model, fitted in answers:
         found = dict(zip(model.space.names, fitted.solution.point.theta, strict=True))
         assert model.found["motor.inertia"] == pytest.approx(found["motor.inertia"], rel=0.01)
-        assert are_alike(reweighed(laid_for(model, found), fitted.program), fitted.program, 0.03)
-        assert not are_alike(reweighed(laid_for(model, {}), fitted.program), fitted.program, 0.5)
+        assert are_alike(
+            reweighed(laid_for(model, found), fitted.program), fitted.program, fitted.solution.point.theta, 0.03
+        )
+        assert not are_alike(
+            reweighed(laid_for(model, {}), fitted.program), fitted.program, fitted.solution.point.theta, 0.5
+        )
 
 
 def test_gaps_go_with_the_optimum(answers: list[tuple[Model, Fitted]]) -> None:
