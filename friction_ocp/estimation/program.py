@@ -353,7 +353,7 @@ class Program:
         assert result.dend is not None
         weight, states, jumps = cut.weights(point.theta), nodes.shape[1], result.end[:-1] - nodes[1:]
         before, after = slice(0, cut.count - 1), slice(1, cut.count)
-        gap = np.einsum("kij,kj->ki", weight, jumps)
+        gap: FloatArray = np.einsum("kij,kj->ki", weight, jumps)
         jacobian = weight @ result.dend[:-1]
         system.cost += 0.5 * float(np.sum(gap**2))
         if cut.slopes is not None and len(slope):
