@@ -36,6 +36,7 @@ from friction_ocp.simulation.losses import AbstractLoss, Squares
 COARSE = Tolerances(decrease=1e-4, progress=1e-3, max_iterations=25)
 FINE = Tolerances(inner=4)
 SMOOTH = replace(FINE, max_iterations=30)
+"""Where the sign is smoothed and the exact one is to begin: to the end, unless that is far."""
 LEAST = 1e-3
 """Decrease of the objective by three steps that is next to nothing, were the residuals noise."""
 RELEASED_WIDTHS = (0.0025, 0.001, 0.0)

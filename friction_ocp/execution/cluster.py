@@ -106,8 +106,12 @@ def _done(task: bytes, shared: Any) -> Outcome:
 
 
 def _outcome(future: Any, task: Task) -> Outcome:
-    """Return what came of a task; the cluster gives up on one that took several workers with it."""
-    if future.status == "finished":
-        return future.result()
-    reason = future.exception() if future.status == "error" else future.status
-    return Outcome(task.key, error=f"the cluster lost it ({type(reason).__name__}: {reason})", lost=True)
+    """Return what came of a task; the cluster gives up on one that took several workers with it.
+
+    A worker that is lost between the end of a task and the fetching of its value has another one do it again: a future
+    that has ended may be pending once more, and is waited for.
+    """
+    if future.status in ("error", "cancelled"):
+        reason = future.exception() if future.status == "error" else future.status
+        return Outcome(task.key, error=f"the cluster lost it ({type(reason).__name__}: {reason})", lost=True)
+    return future.result()

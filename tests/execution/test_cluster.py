@@ -22,11 +22,11 @@ from diagnosis_cases import axis, write_case
 from friction_ocp.diagnosis.diagnose import diagnose
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.execution.cluster import Cluster
+from friction_ocp.execution.cluster import Cluster, _outcome
 from friction_ocp.execution.executor import InProcess, executor_of
 from friction_ocp.execution.ledger import Ledger
 from friction_ocp.execution.run import Tally, run_tasks
-from friction_ocp.execution.task import Task
+from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.multistart import multistart
@@ -95,6 +95,37 @@ def test_every_task_has_an_outcome(workers: Workers, tmp_path: Path) -> None:
     assert [outcome.value for outcome in found.values()] == [{"value": 1.0}, None, {"value": 2.0}]
     assert found["bad"].error == "ZeroDivisionError: bad cannot be done" and not found["bad"].lost
     assert len(list((tmp_path / "tasks").iterdir())) == 3
+
+
+@dataclass
+class Ended:
+    """A future that has ended, whose worker was lost before its value was fetched: `status` is what it says of that."""
+
+    status: str
+    value: Outcome
+
+    def result(self) -> Outcome:
+        """Return the value that another worker has found meanwhile."""
+        return self.value
+
+    def exception(self) -> Exception:
+        """Return why the cluster has given up."""
+        return RuntimeError("three workers died")
+
+
+@pytest.mark.parametrize("status", ["finished", "pending", "lost"])
+def test_a_value_that_is_lost_on_the_way_is_waited_for(status: str) -> None:
+    """The cluster does its task again, and what comes of that counts."""
+    task = Task("t", slowly_noted, ("t", 0.3))
+    again = Outcome("t", value={"value": 0.3})
+    assert _outcome(Ended(status, again), task) is again
+
+
+@pytest.mark.parametrize(("status", "said"), [("error", "three workers died"), ("cancelled", "cancelled")])
+def test_a_task_that_the_cluster_gives_up_is_lost(status: str, said: str) -> None:
+    """It has no value, and an error that says why."""
+    found = _outcome(Ended(status, Outcome("t", value=1.0)), Task("t", slowly_noted, ("t", 0.3)))
+    assert found.lost and found.value is None and found.error is not None and said in found.error
 
 
 def test_a_lost_worker_costs_its_task_only(workers: Workers, tmp_path: Path) -> None:
