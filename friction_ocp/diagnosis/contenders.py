@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,12 +36,14 @@ def _promising(found: Sequence[Screened]) -> list[Screened]:
 
 
 def to_refit(
-    crew: Crew, chosen: Sequence[Screened], found: Sequence[Screened]
+    crew: Crew, chosen: Sequence[Screened], found: Sequence[Screened], shapes: Collection[Key] = ()
 ) -> tuple[list[Screened], list[Screened]]:
     """Return chosen candidates with others of all that were found, and those to be refitted from the guesses, too.
 
-    What may be large and yet promises nothing is tried wherever a model has gone astray. From the guesses refits begin
-    where a fit is at odds with priors, too: it has gone where parameters stand in for what is missing.
+    What may be large and yet promises nothing is tried wherever a model has gone astray; there and from the guesses, so
+    are the more general `shapes` of what segments have found, whose promises parameters that are far off hide. From the
+    guesses refits begin where a fit is at odds with priors, too: it has gone where parameters stand in for what is
+    missing.
     The few that loosely joined segments promise most of are tried beside the first few of lost free runs, whatever
     share of the largest promise that is: neither prediction tells for certain what is worth little. Fits of loosely
     joined segments do, where both are judged by squares and the best is no work of chance, but for what promises most
@@ -62,8 +64,13 @@ def to_refit(
         most = [item.key for item in first[:1]]
         leading = _and(leading, [item for item in tried if item.key in most])
         return _and(leading, [item for item in tried if any(other.holds(item) for other in leading)]), []
-    unfitted = _promising(crew.screened_unfitted(keys))
-    return with_outright(with_resembling(chosen, found, astray=True), found), with_outright(unfitted, found)
+    from_guesses = crew.screened_unfitted(keys)
+    tried, unfitted = with_resembling(chosen, found, astray=True), _promising(from_guesses)
+    tried, unfitted = (
+        _and(some, [item for item in all_found if item.key in shapes and item.starts])
+        for some, all_found in ((tried, found), (unfitted, from_guesses))
+    )
+    return with_outright(tried, found), with_outright(unfitted, found)
 
 
 def with_outright(chosen: Sequence[Screened], others: Sequence[Screened]) -> list[Screened]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from friction_ocp.diagnosis.bench import Bench, open_predicting
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.polishing import polished
 from friction_ocp.diagnosis.refit import MOST_OF, completed
 from friction_ocp.diagnosis.rival import Rival, is_another
@@ -18,16 +19,18 @@ from friction_ocp.statistics.execution import Execution
 
 LEAST_SHARE = 0.25
 """Of the effort, for another search where the one before took more than the rest."""
+FOR_PREDICTIONS = 0.5
+"""The same for a search by predictions, which goes through what an answer needs: an addition, and then its shape."""
 
 
 def led_by_predictions(search: Search, run: Execution) -> Search:
     """Look for additions by short predictions where a search lost its way; return the search that found some.
 
-    Where lost free runs have found something, what predictions say instead counts if it takes most of what they miss.
-    Free runs that come back to the recordings with these additions show what predictions cannot, and the search goes on
-    with them.
+    Where simulations have found something and stay far off, what predictions say instead counts if it takes most of
+    what they miss, of lost free runs, or more than what was found, fitted to predictions, takes of it. Free runs that
+    come back to the recordings with these additions show what predictions cannot, and the search goes on with them.
     """
-    patience = search.patience * max(1.0 - search.effort, LEAST_SHARE)
+    patience = search.patience * max(1.0 - search.effort, FOR_PREDICTIONS)
     other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
     other.go()
     if not other.accepted or (search.accepted and not _tells_otherwise(search, other)):
@@ -37,9 +40,24 @@ def led_by_predictions(search: Search, run: Execution) -> Search:
 
 
 def _tells_otherwise(search: Search, other: Search) -> bool:
-    """Whether predictions name something else than free runs did, and miss less than half of what they had missed."""
-    before, after = (innovations(model).ratio - 1.0 for model in (other.bench.base, other.bench.current))
-    return not set(search.accepted) & set(other.accepted) and after < MOST_OF * before
+    """Whether predictions name something else, and miss less: than half of what they had missed, where free runs were
+    lost, else than with what segments that torque noise joins have named.
+    """
+    if set(search.accepted) & set(other.accepted):
+        return False
+    known, base, current = search.bench.current, other.bench.base, other.bench.current
+    if known.lost:
+        before, after = (innovations(model).ratio - 1.0 for model in (base, current))
+        return after < MOST_OF * before
+    return current.cost < _by_predictions(known, base).cost
+
+
+def _by_predictions(fitted: FittedModel, base: FittedModel) -> FittedModel:
+    """Fit a model to predictions, from where it stands and from where those have led the base model."""
+    begins = [fitted.values, {**fitted.values, **base.values}]
+    starts = [fitted.model.space.with_known(values) for values in begins]
+    ends = [polished(fitted.model, base.footing, theta, None) for theta in starts]
+    return min(ends, key=lambda end: end.objective)
 
 
 def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | None:

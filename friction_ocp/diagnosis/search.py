@@ -97,9 +97,9 @@ class Search:
 
     @property
     def lost_its_way(self) -> bool:
-        """Whether simulations of a model far off lead nowhere: nothing was added, or free runs stay lost with it."""
+        """Whether simulations of a model far off lead nowhere: nothing was added, or it stays far off with that."""
         base = self.bench.base
-        return base.astray and not base.footing.predicted and (not self.accepted or self.bench.current.lost)
+        return base.astray and not base.footing.predicted and (not self.accepted or self.bench.current.astray)
 
     def _exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""
@@ -384,7 +384,7 @@ class Search:
         chosen += displaced(self.rounds, known, chosen)
         if power.significant(level):
             chosen = with_outright(chosen, [known[key] for key in again if key in known])
-        chosen, unfitted = to_refit(crew, chosen, found)
+        chosen, unfitted = to_refit(crew, chosen, found, again)
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         asked = {key: -np.inf if key in again else enough for key in known}

@@ -18,8 +18,9 @@ from friction_ocp.diagnosis.bench import open_bench, open_predicting
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.footing import Footing
 from friction_ocp.diagnosis.options import considered
+from friction_ocp.diagnosis.polishing import polished
 from friction_ocp.diagnosis.search import Search
-from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.model import prepare, with_drive
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
@@ -28,6 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "problems" / "benchmarks"))
 import gaps
 
 HERE = Execution(InProcess())
+EFFECTS = ("stribeck", "unbalance")
 RISE = {"law": "stribeck", "tau_s": 0.3, "omega_s": 0.5}
 
 
@@ -74,11 +76,13 @@ def test_predictions_tell_what_is_missing(path: Path) -> None:
 
 
 def test_they_are_asked_where_a_search_found_nothing_and_its_base_is_astray(path: Path) -> None:
-    """Not where something was found."""
+    """Not where something was found with which it is astray no more."""
     search = Search(open_bench(load_problem(path), HERE), HERE, considered(load_problem(path)), 0.01, lambda *_: None)
     base = search.bench.base
     assert search.lost_its_way == base.astray
     search.accepted.append(("stribeck", "motor"))
+    assert search.lost_its_way == base.astray
+    search.bench.__dict__["current"] = SimpleNamespace(astray=False)
     assert not search.lost_its_way
 
 
@@ -90,17 +94,36 @@ def test_what_predictions_name_instead_counts_if_they_miss_little(
 ) -> None:
     """Lost free runs have found an unbalance; predictions missed as much as noise has, and miss less or as much now."""
     monkeypatch.setattr(predicted, "innovations", lambda ratio: SimpleNamespace(ratio=ratio))
-    lost: Any = SimpleNamespace(accepted=[("unbalance", "motor")])
+    known = SimpleNamespace(current=SimpleNamespace(lost=True))
+    lost: Any = SimpleNamespace(accepted=[("unbalance", "motor")], bench=known)
     bench = SimpleNamespace(base=2.0, current=after)
     other: Any = SimpleNamespace(accepted=[(named, "motor")], bench=bench)
     assert predicted._tells_otherwise(lost, other) == counts
 
 
-@pytest.mark.parametrize(("accepted", "lost", "asked"), [(0, False, True), (1, False, False), (1, True, True)])
-def test_they_are_asked_where_free_runs_stay_lost(accepted: int, lost: bool, asked: bool) -> None:
-    """With what was added to a model that had gone astray."""
+def test_of_segments_counts_what_predictions_name_if_it_predicts_better(path: Path) -> None:
+    """Better than what segments had named does, fitted to predictions itself."""
+    bench = open_bench(load_problem(path), HERE)
+    predicting_bench = open_predicting(bench, HERE)
+    base, crew = predicting_bench.base, Crew(bench, HERE, 1, lambda what, share: None)
+    drives = {item.effect: item.augmentation.drive for item in crew.screened([(name, "motor") for name in EFFECTS])}
+    models = {name: with_drive(base.model, drive) for name, drive in drives.items()}
+    fits = {name: polished(model, base.footing, model.space.guess, None) for name, model in models.items()}
+    assert fits["stribeck"].cost < fits["unbalance"].cost
+    for own, others, counts in [("unbalance", "stribeck", True), ("stribeck", "unbalance", False)]:
+        known = bench.base
+        stood = polished(models[own], known.footing, models[own].space.guess, None)
+        search: Any = SimpleNamespace(accepted=[(own, "motor")], bench=SimpleNamespace(current=stood))
+        seat = SimpleNamespace(base=base, current=fits[others])
+        other: Any = SimpleNamespace(accepted=[(others, "motor")], bench=seat)
+        assert predicted._tells_otherwise(search, other) == counts
+
+
+@pytest.mark.parametrize(("accepted", "astray", "asked"), [(0, True, True), (1, False, False), (1, True, True)])
+def test_they_are_asked_where_a_model_stays_far_off(accepted: int, astray: bool, asked: bool) -> None:
+    """With what was added to one that had gone astray."""
     base = SimpleNamespace(astray=True, footing=SimpleNamespace(predicted=False))
-    bench = SimpleNamespace(base=base, current=SimpleNamespace(lost=lost))
+    bench = SimpleNamespace(base=base, current=SimpleNamespace(astray=astray))
     search: Any = SimpleNamespace(bench=bench, accepted=[("stribeck", "motor")] * accepted)
     assert Search.lost_its_way.fget(search) == asked  # pyright: ignore[reportOptionalCall]
 
