@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
@@ -43,20 +43,27 @@ def made_by_inputs(model: Model) -> TorqueNoise:
     return TorqueNoise(_input_density(model, numbers[model.train[0].name]), numbers)
 
 
-def joining(model: Model, theta: FloatArray | None = None) -> TorqueNoise:
-    """Return the torque noise that segments of a model are joined by, at parameters `theta` (parameters,).
+def joining(model: Model) -> TorqueNoise:
+    """Return the torque noise that segments of a model are joined by, at what its gaps are laid for."""
+    return joining_at(model)(model.nominal)
 
-    None are what its gaps are laid for. What noise of inputs makes is as much as their torque constants, which may be
-    fitted, have changed since the guesses.
+
+def joining_at(model: Model) -> Callable[[FloatArray], TorqueNoise]:
+    """Return what tells the torque noise that segments of a model are joined by, at parameters (parameters,).
+
+    What noise of inputs makes is as much as their torque constants, which may be fitted, have changed since guessed.
     """
-    numbers = _numbers_at(model, model.nominal if theta is None else theta)
-    if not model.joins_noise:
-        return TorqueNoise(model.process_noise, numbers)
-    first, noise = model.train[0].name, partial(input_noise, model)
-    before = input_power(model.problem.drive, model.space.numbers_by_path(model.space.guess, first), noise)
-    now = input_power(model.problem.drive, numbers[first], noise)
-    grown = {shaft: float(np.sqrt(now[shaft] / max(power, 1e-300))) for shaft, power in before.items()}
-    return TorqueNoise({key: grown.get(key, 1.0) * value for key, value in model.process_noise.items()}, numbers)
+    first, noise = model.train[0].name, cache(partial(input_noise, model))
+    guessed = model.space.numbers_by_path(model.space.guess, first)
+    before = input_power(model.problem.drive, guessed, noise) if model.joins_noise else {}
+
+    def at(theta: FloatArray) -> TorqueNoise:
+        numbers = _numbers_at(model, theta)
+        now = input_power(model.problem.drive, numbers[first], noise) if model.joins_noise else {}
+        grown = {shaft: float(np.sqrt(now[shaft] / max(power, 1e-300))) for shaft, power in before.items()}
+        return TorqueNoise({key: grown.get(key, 1.0) * value for key, value in model.process_noise.items()}, numbers)
+
+    return at
 
 
 def _numbers_at(model: Model, theta: FloatArray) -> dict[str, dict[str, float]]:

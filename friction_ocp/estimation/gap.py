@@ -8,7 +8,7 @@ import numpy as np
 
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import WARMTH
-from friction_ocp.estimation.drive_noise import input_impulses, joining
+from friction_ocp.estimation.drive_noise import input_impulses, joining, joining_at
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.node_gaps import gap_roots, gap_slopes
@@ -58,8 +58,9 @@ def following(model: Model, program: Program) -> Program:
     theta = model.nominal
     steps = np.where(theta == 0.0, STEP, STEP * np.abs(theta))
     moves = np.diag(steps)
-    sides = [(joining(model, theta - move), joining(model, theta + move)) for move in moves]
-    noise = joining(model)
+    noise_at = joining_at(model)
+    sides = [(noise_at(theta - move), noise_at(theta + move)) for move in moves]
+    noise = noise_at(theta)
 
     def one(item: Experiment, cut: Segments) -> Segments:
         if cut.gap_weight is None or cut.count < 2:
