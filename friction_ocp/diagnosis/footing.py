@@ -15,7 +15,7 @@ from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import start_weight
 from friction_ocp.estimation.horizon import is_held
 from friction_ocp.estimation.model import Model, seen_by
-from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import Segments
 from friction_ocp.estimation.stages import measured_from, windows
@@ -93,7 +93,7 @@ class Footing(TorqueNoise):
         first = np.unique(np.concatenate([first, further[further < first[-1]]])).astype(np.int64)
         start = np.zeros((len(first) - 1, model.state_scale.size))
         start[0] = start_weight(model, item)
-        weights = gap_roots(model, self, item, first, impulses)
+        weights = NodeGaps(model, self, item, first, impulses).roots()
         if model.problem.estimation.initial_state == "measured":
             return Segments(first, weights, measured=1)
         return Segments(first, weights, start_weight=start)

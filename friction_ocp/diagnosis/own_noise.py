@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.linear import LinearRecording
 from friction_ocp.estimation.drive_noise import input_impulses, torque_noise
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import Segments
 from friction_ocp.simulation.grid import FloatArray
@@ -75,6 +75,6 @@ def _reweighed(
     if cut.gap_weight is None or cut.count < 2:
         return cut, np.zeros(0)
     impulses = input_impulses(model, item, moving.numbers[item.name])
-    roots = gap_roots(model, foot, item, cut.first, impulses, moving)
+    roots = NodeGaps(model, foot, item, cut.first, impulses).roots(moving)
     wider = np.linalg.slogdet(cut.gap_weight)[1] - np.linalg.slogdet(roots)[1]
     return replace(cut, gap_weight=roots), np.asarray(wider, dtype=np.float64)

@@ -11,7 +11,7 @@ from friction_ocp.drive.mechanism import WARMTH
 from friction_ocp.estimation.drive_noise import input_impulses, joining, joining_at
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.node_gaps import gap_roots, gap_slopes
+from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import GapSlopes, Segments
 from friction_ocp.estimation.torque_noise import acceleration_noise, torque_covariance
@@ -40,7 +40,7 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
         return np.tile(np.diag(1.0 / (RELATIVE_GAP * model.state_scale)), (durations.size, 1, 1))
     if model.joins_noise:
         noise = joining(model)
-        return gap_roots(model, noise, item, first, input_impulses(model, item, noise.numbers[item.name]))
+        return NodeGaps(model, noise, item, first, input_impulses(model, item, noise.numbers[item.name])).roots()
     shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
     roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
     return np.asarray(roots, dtype=np.float64)
@@ -66,8 +66,8 @@ def following(model: Model, program: Program) -> Program:
         if cut.gap_weight is None or cut.count < 2:
             return cut
         impulses = input_impulses(model, item, noise.numbers[item.name])
-        by_theta = gap_slopes(model, noise, item, cut.first, impulses, sides, steps)
-        return replace(cut, slopes=GapSlopes(theta, by_theta))
+        gaps = NodeGaps(model, noise, item, cut.first, impulses)
+        return replace(cut, slopes=GapSlopes(theta, gaps.slopes(sides, steps)))
 
     pairs = zip(program.experiments, program.segments, strict=True)
     return replace(program, segments=tuple(one(item, cut) for item, cut in pairs))

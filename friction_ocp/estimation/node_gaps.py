@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,107 +23,90 @@ NEGLIGIBLE_GAP = 0.1
 """Gap over the noise floor that stands for a state that no noise enters."""
 
 
-def gap_roots(
-    model: Model,
-    noise: TorqueNoise,
-    item: Experiment,
-    first: IntArray,
-    impulses: Mapping[str, FloatArray],
-    moving: TorqueNoise | None = None,
-    told: bool = False,
-) -> FloatArray:
-    """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
+@dataclass(frozen=True)
+class NodeGaps:
+    """Gaps between segments of a recording, laid about the motion that a drive has with the numbers of a torque noise.
 
     Torque noise makes the states wander, more so where an input jumps between two samples; states that no noise
     enters may jump by a share of the noise floor, and by as much in sum where a segment is cut, and deflections by what
     torque noise makes of their torque.
-    `moving` holds the torque noise, and the inertias that it moves, where these are not those of `noise`. None of it
-    moves a state where it is `told` from sample to sample.
     """
-    if len(first) < 3:
-        states = len(model.drive.state_names)
-        return np.zeros((0, states, states))
-    mover = replace(noise, density={}) if told else noise if moving is None else moving
-    return _roots(model, noise, item, first, impulses, mover, _ground(model, noise, item, first, told))
 
+    model: Model
+    noise: TorqueNoise
+    item: Experiment
+    first: IntArray
+    """(segments + 1,) the first node of every segment, the last node behind them."""
+    impulses: Mapping[str, FloatArray]
+    """By shaft (n,) N m s: how far the torque of each interval may be off because an input jumps inside it."""
+    told: bool = False
+    """Whether torque noise is told from sample to sample: none of it moves a state then."""
 
-def gap_slopes(
-    model: Model,
-    noise: TorqueNoise,
-    item: Experiment,
-    first: IntArray,
-    impulses: Mapping[str, FloatArray],
-    sides: Sequence[tuple[TorqueNoise, TorqueNoise]],
-    steps: FloatArray,
-) -> FloatArray:
-    """Return (gaps, states, states, parameters) derivatives of the roots of gaps by the parameters.
+    def roots(self, moving: TorqueNoise | None = None) -> FloatArray:
+        """Return (gaps, states, states) W with W'W the inverse covariance of each gap.
 
-    `sides` hold the torque noise, and the numbers that it moves, with each parameter less and more by its step of
-    `steps` (parameters,): central differences, about the motion that `noise` has and with the jumps of states that no
-    noise enters.
-    """
-    ground = _ground(model, noise, item, first, told=False)
+        `moving` is the torque noise, with the inertias that it moves, where these are not those that gaps are laid for.
+        """
+        if len(self.first) < 3:
+            states = len(self.model.drive.state_names)
+            return np.zeros((0, states, states))
+        mover = replace(self.noise, density={}) if self.told else moving or self.noise
+        return self._roots(self.noise, mover)
 
-    def roots(side: TorqueNoise) -> FloatArray:
-        return _roots(model, side, item, first, impulses, side, ground)
+    def slopes(self, sides: Sequence[tuple[TorqueNoise, TorqueNoise]], steps: FloatArray) -> FloatArray:
+        """Return (gaps, states, states, parameters) derivatives of the roots by the parameters.
 
-    slopes = [(roots(more) - roots(less)) / (2.0 * step) for (less, more), step in zip(sides, steps, strict=True)]
-    return np.stack(slopes, axis=-1)
+        `sides` hold the torque noise, and the numbers that it moves, with each parameter less and more by its step of
+        `steps` (parameters,): central differences, about the same motion and with the same jumps of states that no
+        noise enters.
+        """
 
+        def one(less: TorqueNoise, more: TorqueNoise, step: float) -> FloatArray:
+            return (self._roots(more, more) - self._roots(less, less)) / (2.0 * step)
 
-@dataclass(frozen=True)
-class _Ground:
-    """What gaps are laid about."""
+        return np.stack([one(*side, step) for side, step in zip(sides, steps, strict=True)], axis=-1)
 
-    spans: FloatArray
-    """(kinds,) s of segments that are alike."""
-    motions: FloatArray
-    """(kinds, states) how these move."""
-    which: IntArray
-    """(segments,) the kind of each."""
-    still: FloatArray
-    """(states,) how far those may jump that no noise enters."""
+    def _roots(self, noise: TorqueNoise, mover: TorqueNoise) -> FloatArray:
+        """Return the roots where a torque noise `mover` moves a drive that has the numbers of another."""
+        model, (spans, motions, which) = self.model, self._kinds
+        units = unit_covariances(model, slopes_about(model, self._numbers(noise), motions), spans)
+        power = group_density(model, mover, self.item.name)[:, None] ** 2 + self._jump_power(mover)
+        part = np.minimum(1.0, self._spans / np.median(self._spans))[:, None, None]
+        gathered: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which])
+        covariance = gathered + part * np.diag(self._still**2)
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
 
+    def _numbers(self, noise: TorqueNoise) -> FloatArray:
+        return leaf_numbers(self.model, noise, self.item.name)
 
-def _ground(model: Model, noise: TorqueNoise, item: Experiment, first: IntArray, told: bool) -> _Ground:
-    numbers, spans = leaf_numbers(model, noise, item.name), np.diff(item.grid.time[first])
-    kinds = alike(spans, motions_of(model, numbers, item, (first[:-1] + first[1:]) // 2))
-    at_rest = slopes_about(model, numbers, np.zeros((1, len(model.drive.state_names))))[0]
-    return _Ground(*kinds, still_gaps(model, noise, item.name, float(np.median(spans)), at_rest, told))
+    @cached_property
+    def _spans(self) -> FloatArray:
+        """(segments,) s."""
+        return np.diff(self.item.grid.time[self.first])
 
+    @cached_property
+    def _kinds(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """(kinds,) s of segments that are alike, (kinds, states) how these move, (segments,) the kind of each."""
+        middles = (self.first[:-1] + self.first[1:]) // 2
+        return alike(self._spans, motions_of(self.model, self._numbers(self.noise), self.item, middles))
 
-def _roots(
-    model: Model,
-    noise: TorqueNoise,
-    item: Experiment,
-    first: IntArray,
-    impulses: Mapping[str, FloatArray],
-    mover: TorqueNoise,
-    ground: _Ground,
-) -> FloatArray:
-    spans = np.diff(item.grid.time[first])
-    slopes = slopes_about(model, leaf_numbers(model, noise, item.name), ground.motions)
-    units = unit_covariances(model, slopes, ground.spans)
-    power = group_density(model, mover, item.name)[:, None] ** 2 + _jump_power(model, mover, item, first, impulses)
-    part = np.minimum(1.0, spans / np.median(spans))[:, None, None]
-    gathered: FloatArray = np.einsum("gs,gsij->sij", power, units[:, ground.which])
-    covariance = gathered + part * np.diag(ground.still**2)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
+    @cached_property
+    def _still(self) -> FloatArray:
+        """(states,) how far those may jump that no noise enters."""
+        model, span = self.model, float(np.median(self._spans))
+        at_rest = slopes_about(model, self._numbers(self.noise), np.zeros((1, len(model.drive.state_names))))[0]
+        return still_gaps(model, self.noise, self.item.name, span, at_rest, self.told)
 
-
-def _jump_power(
-    model: Model, noise: TorqueNoise, item: Experiment, first: IntArray, impulses: Mapping[str, FloatArray]
-) -> FloatArray:
-    """Return (groups, segments) the power density of acceleration that jumps of inputs may hide."""
-    mech = model.drive.mechanism
-    inertias = group_inertias(mech, known_numbers(model, noise, item.name))
-    spans = np.diff(item.grid.time[first])
-    power = np.zeros((len(inertias), spans.size))
-    for shaft, values in impulses.items():
-        group = mech.topology.group_of[shaft]
-        ratio = speed_ratio(mech, noise.numbers[item.name], shaft) / max(float(inertias[group]), 1e-300)
-        power[group] += np.add.reduceat(values**2, first[:-1]) * ratio**2 / spans
-    return power
+    def _jump_power(self, noise: TorqueNoise) -> FloatArray:
+        """Return (groups, segments) the power density of acceleration that jumps of inputs may hide."""
+        mech = self.model.drive.mechanism
+        inertias = group_inertias(mech, known_numbers(self.model, noise, self.item.name))
+        power = np.zeros((len(inertias), self._spans.size))
+        for shaft, values in self.impulses.items():
+            group = mech.topology.group_of[shaft]
+            ratio = speed_ratio(mech, noise.numbers[self.item.name], shaft) / max(float(inertias[group]), 1e-300)
+            power[group] += np.add.reduceat(values**2, self.first[:-1]) * ratio**2 / self._spans
+        return power
 
 
 def still_gaps(

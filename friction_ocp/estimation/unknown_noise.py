@@ -23,7 +23,7 @@ from friction_ocp.estimation.drive_noise import (
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gap import start_weight
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.noisy_nodes import sampled, with_noise
 from friction_ocp.estimation.program import Program
 from friction_ocp.estimation.segments import Segments
@@ -99,7 +99,7 @@ def _sampled(model: Model, noise: TorqueNoise, item: Experiment) -> Segments:
     """Return segments of one sample each of a recording, whose gaps hold jumps of inputs and no noise of them."""
     first = sampled(item)
     impulses = input_impulses(model, item, noise.numbers[item.name])
-    weights = gap_roots(model, noise, item, first, impulses, told=True)
+    weights = NodeGaps(model, noise, item, first, impulses, told=True).roots()
     if model.problem.estimation.initial_state == "measured":
         return Segments(first, weights, measured=1)
     start = np.zeros((len(first) - 1, model.state_scale.size))

@@ -14,7 +14,7 @@ from friction_ocp.estimation.drive_noise import TorqueNoise
 from friction_ocp.estimation.first_nodes import suggested_nodes, suggested_point
 from friction_ocp.estimation.gap import gap_covariance
 from friction_ocp.estimation.model import Model, prepare
-from friction_ocp.estimation.node_gaps import gap_roots
+from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.parameters import Free
@@ -95,7 +95,8 @@ def test_a_cut_of_segments_that_noise_joins_allows_no_more() -> None:
     cut = np.sort([*whole, whole[4] + SAMPLES // 4, whole[4] + SAMPLES // 2])
 
     def jumps(first: np.ndarray) -> np.ndarray:
-        roots = np.linalg.inv(gap_roots(model, TorqueNoise({}, {item.name: numbers}), item, first, {}))
+        gaps = NodeGaps(model, TorqueNoise({}, {item.name: numbers}), item, first, {})
+        roots = np.linalg.inv(gaps.roots())
         return roots @ roots.transpose(0, 2, 1)
 
     assert jumps(cut)[4:7].sum(axis=0) == pytest.approx(jumps(whole)[4])
