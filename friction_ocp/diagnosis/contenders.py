@@ -27,7 +27,8 @@ OF_LOST = 6
 """Candidates that are tried for what they promise of free runs that are lost, whatever that is: the order of such
 promises says little."""
 AS_NEAR = 0.01
-"""Share of what the best completed refit leaves up to which what leaves more after a few steps is completed, too."""
+"""Share of what the best completed refit leaves, of those that may be added, up to which what leaves more after a few
+steps is completed, too."""
 
 
 def _promising(found: Sequence[Screened]) -> list[Screened]:
@@ -132,9 +133,10 @@ def completed_rivals(
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
     What lost free runs promise is no prediction, and nothing is made thorough that is far behind there.
-    What fits best where it was fitted may be worth nothing on recordings left out. Where it gains what is `asked` of it
-    and yet will not do, it may have come to rest on the way: at last the best of those begin at other sizes. The first
-    are completed in any case, further ones as long as the search is not `exhausted`.
+    What comes as near as the best that matters is completed beside it: what fits better and is not to be added leaves
+    the field to that. What fits best where it was fitted may be worth nothing on recordings left out. Where it gains
+    what is `asked` of it and yet will not do, it may have come to rest on the way: at last the best of those begin at
+    other sizes. The first are completed in any case, further ones as long as the search is not `exhausted`.
     """
     if not chosen:
         return
@@ -154,7 +156,8 @@ def completed_rivals(
     first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
     rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
-    reached = noise + (1.0 + AS_NEAR) * max(min(item.standing.cost for item in rivals) - noise, 0.0)
+    able = [item for item in rivals if item.standing.material] or rivals
+    reached = noise + (1.0 + AS_NEAR) * max(min(item.standing.cost for item in able) - noise, 0.0)
     near = [k for k in others if refits[k].cost < reached]
     if near:
         others = [k for k in others if k not in near]
@@ -166,7 +169,7 @@ def completed_rivals(
         rivals = [*rivals, *crew.rivals([refits[k] for k in others], without, asked)]
         yield rivals
     rivals.sort(key=lambda item: item.standing.cost)
-    able = [item for item in rivals if current.cost - item.standing.cost >= asked[item.key] and item.screened.starts]
-    again = able[:FINISHED]
+    notable = [item for item in rivals if current.cost - item.standing.cost >= asked[item.key] and item.screened.starts]
+    again = notable[:FINISHED]
     if again and not exhausted():
         yield [*crew.retried(again, without, asked), *(item for item in rivals if item not in again)]

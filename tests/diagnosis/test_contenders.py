@@ -18,8 +18,13 @@ SAMPLES, COST = 1000, 3000.0
 DRIVE: Any = None
 
 
-def completed(*tried: tuple[str, float, float], exhausted: bool = False, lost: bool = False) -> list[list[str]]:
-    """Return the effects whose refits are completed, turn by turn, from (effect, predicted gain, cost after steps)."""
+def completed(
+    *tried: tuple[str, float, float], exhausted: bool = False, lost: bool = False, refused: str = ""
+) -> list[list[str]]:
+    """Return the effects whose refits are completed, turn by turn, from (effect, predicted gain, cost after steps).
+
+    One of them is `refused`: it makes free runs no better.
+    """
     screened = [Screened(effect, "motor", gain, 0.0, (), Augmentation(DRIVE, {}, ())) for effect, gain, _ in tried]
     refits = [Refit(item, None, cost) for item, (_, _, cost) in zip(screened, tried, strict=True)]
     rows = SimpleNamespace(channel=np.zeros(SAMPLES), residual=np.ones(SAMPLES))
@@ -28,9 +33,10 @@ def completed(*tried: tuple[str, float, float], exhausted: bool = False, lost: b
 
     def rivals(some: list[Refit], without: Any, asked: dict[Key, float], thorough: int = 0) -> list[Rival]:
         turns.append([refit.key[0] for refit in some])
+        stood = [SimpleNamespace(cost=refit.cost, material=refit.key[0] != refused) for refit in some]
         return [
-            cast(Any, SimpleNamespace(standing=SimpleNamespace(cost=refit.cost), screened=0, key=refit.key))
-            for refit in some
+            cast(Any, SimpleNamespace(standing=each, screened=0, key=refit.key))
+            for each, refit in zip(stood, some, strict=True)
         ]
 
     def without(shortlist: list[Screened], unfitted: list[Screened]) -> tuple[None, list[Refit]]:
@@ -72,6 +78,20 @@ def test_what_comes_as_near_after_a_few_steps_is_completed_beside_the_best() -> 
     assert completed(*further) == [["sensor_gain", "sensor_offset"], ["asymmetry"], ["warm_up"]]
 
 
+def test_what_is_refused_leaves_the_field_to_what_comes_as_near_as_the_best_of_the_rest() -> None:
+    """A better fit that cannot be added does not make the only other one that was completed the answer."""
+    tried = (
+        ("sensor_eccentricity", 2000.0, 1100.0),
+        ("asymmetry", 1400.0, 2000.0),
+        ("constant_torque", 1390.0, 2005.0),
+    )
+    assert completed(*tried) == [["sensor_eccentricity", "asymmetry"], ["constant_torque"]]
+    alone = completed(*tried, exhausted=True)
+    assert alone == [["sensor_eccentricity", "asymmetry"]]
+    both = completed(*tried, exhausted=True, refused="sensor_eccentricity")
+    assert both == [["sensor_eccentricity", "asymmetry"], ["constant_torque"]]
+
+
 def test_what_lost_runs_promise_counts_for_nothing() -> None:
     """Only what a few steps leave tells which refits are worth completing."""
     tried = (("cogging", 2500.0, 2900.0), ("stribeck", 10.0, 700.0), ("unbalance", 10.0, 1500.0))
@@ -99,3 +119,18 @@ def test_what_promises_most_of_lost_runs_is_refitted() -> None:
     chosen, unfitted = to_refit(crew, found, found)
     assert {item.effect for item in chosen} == {"position_ripple", "torque_ripple", "structural_mode"}
     assert not unfitted
+
+
+def test_the_shape_of_what_segments_have_found_is_tried_whatever_it_promises_where_they_are_far_off() -> None:
+    """From where the model stands and from the guesses: parameters that are far off hide what a shape would do."""
+    start: Any = object()
+    promises = {"torque_saturation": 2900.0, "stribeck": 1.0}
+    found = [
+        Screened(effect, "motor", gain, 0.0, (start,), Augmentation(DRIVE, {}, ())) for effect, gain in promises.items()
+    ]
+    current = SimpleNamespace(astray=True, lost=False)
+    crew: Any = SimpleNamespace(bench=SimpleNamespace(current=current), screened_unfitted=lambda keys: found)
+    for shapes, named in (((), ["torque_saturation"]), ([("stribeck", "motor")], ["torque_saturation", "stribeck"])):
+        chosen, unfitted = to_refit(crew, found[:1], found, shapes)
+        assert [item.effect for item in chosen] == named
+        assert [item.effect for item in unfitted] == named
