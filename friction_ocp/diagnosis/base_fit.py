@@ -25,7 +25,7 @@ from friction_ocp.estimation.node_ends import WARM
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions
-from friction_ocp.estimation.standstill import settled
+from friction_ocp.estimation.standstill import at_rest
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute
 
@@ -140,7 +140,7 @@ def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
 def _from_rest(fitted: FittedModel) -> FittedModel:
     """Fit again from recordings that start at rest, where that costs less."""
     program, point = fitted.linear.program, fitted.linear.point
-    resting = settled(program, point)
+    resting = at_rest(program, point)
     if program.objective(resting) >= program.objective(point):
         return fitted
     return polished(fitted.model, fitted.footing, fitted.theta, resting.nodes)

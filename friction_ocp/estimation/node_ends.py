@@ -9,7 +9,7 @@ from friction_ocp.estimation.gauss_newton import Tolerances
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.splicing import carried_on
-from friction_ocp.estimation.standstill import settled
+from friction_ocp.estimation.standstill import at_rest
 from friction_ocp.simulation.grid import FloatArray
 
 WARM = Tolerances(decrease=1e-6, negligible=0.01, progress=1e-4, max_iterations=40)
@@ -28,7 +28,7 @@ def begun(program: Program, theta: FloatArray) -> Point:
     point = solve_nodes(program, suggested_point(program, theta))
     if program.without_nodes:
         return point
-    return joined(program, settled(program, point))
+    return joined(program, at_rest(program, point))
 
 
 def joined(program: Program, point: Point) -> Point:

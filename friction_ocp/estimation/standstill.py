@@ -19,7 +19,7 @@ MOVES = 5.0
 """Travel in the beginning, or speed, over the noise of a channel from which it moves."""
 
 
-def settled(program: Program, point: Point) -> Point:
+def at_rest(program: Program, point: Point) -> Point:
     """Return the point with recordings started at rest, or with bristles that carry nothing, where that costs less.
 
     A shaft that slides at a hundredth of a radian a second in the model, and sticks in truth, stays wrong: until it

@@ -17,7 +17,7 @@ from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.modes import STEP_PER_RADIAN
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point
-from friction_ocp.estimation.standstill import settled
+from friction_ocp.estimation.standstill import at_rest
 from friction_ocp.problem_file.load import load_problem
 
 SLIDING = 0.3
@@ -35,7 +35,7 @@ def test_a_start_that_slides_the_wrong_way_is_brought_to_rest(tmp_path: Path) ->
         node[0, 1] = -SLIDING * np.sign(node[1, 1])
     sliding = Point(point.theta, nodes)
     assert program.objective(sliding) > program.objective(point) + 10.0
-    assert program.objective(settled(program, sliding)) < program.objective(point) + 1.0
+    assert program.objective(at_rest(program, sliding)) < program.objective(point) + 1.0
 
 
 def slipping(folder: Path) -> Model:
@@ -61,7 +61,7 @@ def test_springs_that_slip_from_the_start_on_are_slackened(tmp_path: Path) -> No
         node[0, at] = 1.01 * REACH * np.sign(node[1, 1])
     bent = carrying(program, Point(point.theta, nodes), np.array([at]))
     assert program.objective(solve_nodes(program, bent)) > program.objective(point) + 1000.0
-    assert program.objective(settled(program, bent)) < program.objective(point) + 1.0
+    assert program.objective(at_rest(program, bent)) < program.objective(point) + 1.0
 
 
 def test_springs_ask_for_steps_as_short_as_they_swing(tmp_path: Path) -> None:
