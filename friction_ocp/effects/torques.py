@@ -71,7 +71,10 @@ def mode_of(shaft: str) -> str:
 
 
 class StructuralModeEffect(AbstractEffect):
-    """A further inertia on a spring, or some of that which is stated."""
+    """A further inertia on a spring, or some of that which is stated.
+
+    One that nothing damps is none: what rings for ever is driven, and no part of the machine.
+    """
 
     name: ClassVar[str] = "structural_mode"
     sentence: ClassVar[str] = "a further inertia hangs on the shaft by a spring"
@@ -118,7 +121,7 @@ class StructuralModeEffect(AbstractEffect):
             hung = {f"{mode}.inertia": MOST_HUNG * whole, **{path: grown * small[path] for path in joint_paths}}
             return {**small, **hung, f"{place}.inertia": (1.0 - MOST_HUNG) * whole}
 
-        return Augmentation(added, off, trials, large)
+        return Augmentation(added, off, trials, large, inside=(damping,))
 
 
 def _lightened(shaft: Shaft) -> Shaft:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -65,6 +65,18 @@ def test_what_is_as_large_as_it_may_be_is_another_effect(effect: str, place: str
     added = effects()[effect].augment(drive, place, Clues((), {}, {"motor": 0.1}))
     candidate = Screened(effect, place, 1.0, 0.0, (), added)
     for ended, another in ((path, True), ("motor.inertia", False)):
+        fitted = cast(FittedModel, SimpleNamespace(at_bound=lambda name, ended=ended: name == ended))
+        assert is_another(candidate, fitted) is another
+
+
+def test_a_mode_that_nothing_damps_is_another_effect() -> None:
+    """What rings for ever at one frequency is driven by something periodic in time."""
+    drive = Drive((Shaft("motor", 0.02),), (), (Motor("drive", "motor"),), None, (Channel("theta", "motor.theta"),))
+    track = SimpleNamespace(time=np.arange(0.0, 10.0, 1e-3))
+    clues: Any = SimpleNamespace(numbers={"motor.inertia": 0.02}, tracks=(track,), ringing=lambda *known: ())
+    added = effects()["structural_mode"].augment(drive, "motor", clues)
+    candidate = Screened("structural_mode", "motor", 1.0, 0.0, (), added)
+    for ended, another in (("motor-motor_mode.damping", True), ("motor-motor_mode.stiffness", False)):
         fitted = cast(FittedModel, SimpleNamespace(at_bound=lambda name, ended=ended: name == ended))
         assert is_another(candidate, fitted) is another
 
