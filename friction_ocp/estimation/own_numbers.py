@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from friction_ocp.simulation.losses import Squares
 ENOUGH = Tolerances(max_iterations=30)
 MOST_STARTS = 3
 """From which they are fitted."""
+ORIGIN, PERIOD = "origin", "period"
+"""How the names end of where a wave begins and of its period."""
 
 
 def own_numbers(
@@ -98,10 +101,33 @@ def _fitted(
         np.array([known.get(f"{path}@{other.name}", space.guess[k]) for k, path in enumerate(paths)])
         for other in model.problem.fitted
     ]
-    starts = [solve_nodes(program, suggested_point(program, start)) for start in _different(others)]
+    numbers = {leaf.path: leaf.value for leaf in drive_leaves(shared)}
+    begins = [space.clip(begin) for start in others for begin in _at_other_crests(start, paths, numbers)]
+    starts = [solve_nodes(program, suggested_point(program, begin)) for begin in _different(begins)]
     nearest = sorted(starts, key=program.objective)[:MOST_STARTS]
     best = min((solve_gauss_newton(program, start, ENOUGH) for start in nearest), key=lambda end: end.objective)
     return dict(zip(paths, map(float, best.point.theta), strict=True))
+
+
+def _at_other_crests(start: FloatArray, paths: Sequence[str], numbers: Mapping[str, Any]) -> Iterator[FloatArray]:
+    """Yield a start, and it with where each wave begins a quarter, half or three quarters of its period away.
+
+    From half a period away an iteration may not lead across, and ends at the worst place instead of the best.
+    """
+    yield start
+    for k, path in enumerate(paths):
+        period = numbers.get(f"{path.removesuffix(ORIGIN)}{PERIOD}") if path.endswith(ORIGIN) else None
+        if not period or isinstance(period, Free):
+            continue
+        for share in (0.25, 0.5, 0.75):
+            moved = start.copy()
+            moved[k] = _nearest_zero(start[k] + share * float(period), float(period))
+            yield moved
+
+
+def _nearest_zero(origin: float, period: float) -> float:
+    """Return the same place on a wave, no more than half a period from where the recording begins."""
+    return origin - period * round(origin / period)
 
 
 def _different(starts: Sequence[FloatArray]) -> list[FloatArray]:

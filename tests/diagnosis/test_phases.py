@@ -17,7 +17,8 @@ from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.effects.periods import Seen, likeliest
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.estimation.model import prepare
-from friction_ocp.estimation.own_numbers import fitted_again
+from friction_ocp.estimation.own_numbers import _at_other_crests, fitted_again
+from friction_ocp.parameters import Free
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 from friction_ocp.result_folder import save
@@ -141,6 +142,43 @@ def test_cogging_is_found_behind_an_encoder_that_begins_at_zero(tmp_path: Path) 
     for name, phase in zip("ab", (0.3, 2.1), strict=True):
         angle = TEETH * values[f"motor.cogging.origin@{name}"] - phase
         assert np.sign(values["motor.cogging.cosine"]) * np.cos(angle) > 0.95
+
+
+@pytest.mark.parametrize("share", [0.4, 0.5])
+def test_a_wave_that_begins_far_away_in_a_recording_is_found_there(share: float, tmp_path: Path) -> None:
+    """All others begin together."""
+    path = written(tmp_path, (pushed(0.0), pushed(2.0 * np.pi * share), pushed(0.0)), ())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"] = plain_drive(VISCOUS)
+    origin = {"guess": 0.0, "scope": "recording"}
+    document["drive"]["shafts"][0]["disturbance"] = {"cosine": SIZE, "sine": 0.0, "period": PERIOD, "origin": origin}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    model = prepare(load_problem(path))
+    second = [item for item in model.train if item.name == "b"]
+    again = dict(zip(model.space.names, fitted_again(model, second, model.space.guess), strict=True))
+    assert again["motor.disturbance.origin@b"] % PERIOD == pytest.approx(share * PERIOD, abs=0.02 * PERIOD)
+    assert again["motor.disturbance.origin@a"] == 0.0
+
+
+def test_every_wave_is_tried_at_other_places_of_its_period() -> None:
+    """No more than half a period from zero; one whose period is fitted to the recording itself, or that begins nowhere
+    of its own, as it is.
+    """
+    paths = [
+        "motor.cogging.origin",
+        "motor.external_torque.constant",
+        "motor.cogging.other_origin",
+        "load.ripple.origin",
+    ]
+    numbers = {"motor.cogging.period": 1.0, "motor.cogging.other_period": 0.2, "load.ripple.period": Free(1.0)}
+    start = np.array([15.1, 0.3, 0.05, 0.4])
+    found = np.array(list(_at_other_crests(start, paths, numbers)))
+    np.testing.assert_array_equal(found[0], start)
+    np.testing.assert_allclose(found[1:4, 0], [0.35, -0.4, -0.15], atol=1e-12)
+    np.testing.assert_allclose(found[4:, 2], [0.1, -0.05, 0.0], atol=1e-12)
+    assert len(found) == 7
+    moved = found != start
+    assert np.all(moved[1:4] == [True, False, False, False]) and np.all(moved[4:] == [False, False, True, False])
 
 
 @pytest.mark.slow
