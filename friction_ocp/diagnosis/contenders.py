@@ -36,6 +36,11 @@ def _promising(found: Sequence[Screened]) -> list[Screened]:
     return [item for item in found if item.starts and item.gain >= MOST_ALIKE * found[0].gain][:BEGUN]
 
 
+def _begun_of(found: Sequence[Screened], keys: Collection[Key]) -> list[Screened]:
+    """Return those of some keys that have a start."""
+    return [item for item in found if item.key in keys and item.starts]
+
+
 def to_refit(
     crew: Crew, chosen: Sequence[Screened], found: Sequence[Screened], shapes: Collection[Key] = ()
 ) -> tuple[list[Screened], list[Screened]]:
@@ -66,11 +71,8 @@ def to_refit(
         leading = _and(leading, [item for item in tried if item.key in most])
         return _and(leading, [item for item in tried if any(other.holds(item) for other in leading)]), []
     from_guesses = crew.screened_unfitted(keys)
-    tried, unfitted = with_resembling(chosen, found, astray=True), _promising(from_guesses)
-    tried, unfitted = (
-        _and(some, [item for item in all_found if item.key in shapes and item.starts])
-        for some, all_found in ((tried, found), (unfitted, from_guesses))
-    )
+    tried = _and(with_resembling(chosen, found, astray=True), _begun_of(found, shapes))
+    unfitted = _and(_promising(from_guesses), _begun_of(from_guesses, shapes))
     return with_outright(tried, found), with_outright(unfitted, found)
 
 
