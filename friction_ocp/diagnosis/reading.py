@@ -16,11 +16,13 @@ from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, innovations
 from friction_ocp.drive.parts import Channel, Drive
-from friction_ocp.effects.effect import Key
+from friction_ocp.drive.values import drive_leaves
+from friction_ocp.effects.effect import Clues, Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
 _DRIVING = ("current", "current_command", "torque", "voltage")
@@ -156,4 +158,12 @@ def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
         elif place in kind.places(drive) or (place in drive.prescribed and place in kind.places(released(drive))):
             drive = kind.augment(drive, place, clues).drive
             there.add((effect, place))
+        clues = _seeing(clues, drive)
     return drive
+
+
+def _seeing(clues: Clues, drive: Drive) -> Clues:
+    """Return clues that know what was added to a drive: at its guess."""
+    free = {leaf.path: leaf.value.guess for leaf in drive_leaves(drive) if isinstance(leaf.value, Free)}
+    added = {path: guess for path, guess in free.items() if path not in clues.numbers}
+    return replace(clues, numbers={**clues.numbers, **added}) if added else clues

@@ -32,8 +32,7 @@ def integrator_step(drive: SteppedDrive, space: ParameterSpace, problem: Problem
     """
     longest = 10.0
     for use in problem.train:
-        typical = [_typical(use, name) for name in drive.input_names]
-        rates = _rates(drive, space.numbers(space.guess, use.name), typical)
+        rates = _rates(drive, space.numbers(space.guess, use.name), _inputs_at_rest(drive, use))
         fastest = float(np.max(np.abs(rates.imag), initial=0.0))
         decay = float(np.max(-rates.real, initial=0.0))
         longest = min(longest, STEP_PER_RADIAN / max(fastest, 1e-6), STEP_PER_DECAY / max(decay, 1e-6))
@@ -47,10 +46,18 @@ def slowest_period(drive: SteppedDrive, space: ParameterSpace, problem: Problem)
     if not problem.train:
         return np.inf
     use = problem.train[0]
-    typical = [_typical(use, name) for name in drive.input_names]
-    frequencies = np.abs(_rates(drive, space.numbers(space.guess, use.name), typical).imag)
+    frequencies = np.abs(_rates(drive, space.numbers(space.guess, use.name), _inputs_at_rest(drive, use)).imag)
     oscillating = frequencies[frequencies > 1e-3]
     return float(2.0 * np.pi / np.min(oscillating)) if oscillating.size else np.inf
+
+
+def _inputs_at_rest(drive: SteppedDrive, use: RecordingUse) -> list[float]:
+    """Return a typical value of every input, and zero for what the controller is to reach: it has reached that.
+
+    Far from it, the effort of the controller is at its limit, where the loop has no mode.
+    """
+    wanted = {channel.name for channel in drive.mechanism.drive.channels if channel.part == "reference"}
+    return [0.0 if name in wanted else _typical(use, name) for name in drive.input_names]
 
 
 def _typical(use: RecordingUse, name: str) -> float:

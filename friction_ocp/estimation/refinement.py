@@ -12,7 +12,7 @@ from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gap import following
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model, with_step
-from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.program import Linearisation, Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rough_bowl import unstuck
 from friction_ocp.estimation.rounds import Fitted, limits
@@ -23,24 +23,27 @@ from friction_ocp.simulation.losses import Absolute
 SHIFT = 0.1
 """How far, in standard errors, half the step may move any parameter."""
 HALVINGS = 4
+HALVED = (3.0 / 4.0) ** 2
+"""Mean square of what half the step of a method of order 2 changes over that of the error of the whole step."""
 
 
 def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
     """Return a fit whose integrator steps are short enough, and the model with them.
 
     The first step follows from the fastest mode of the drive; that it suffices for the noise of these recordings shows
-    only now: one Gauss-Newton step on half the integrator step may not move a parameter by more than SHIFT. How short
-    they have to be is found at the fit with the first ones, and fitted once. Segments that noise joins stick or slide
-    elsewhere with them.
+    only now: one Gauss-Newton step on half the integrator step may not move a parameter by more than SHIFT, and what it
+    changes in the residuals may not show among them. How short they have to be is found at the fit with the first ones,
+    and fitted once. Segments that noise joins stick or slide elsewhere with them.
     """
-    if model.problem.estimation.max_step is not None or isinstance(fitted.program.loss, Absolute):
+    stated = model.problem.estimation.max_step is not None or not model.train
+    if stated or isinstance(fitted.program.loss, Absolute):
         return model, fitted
     program, point, first = fitted.program, fitted.solution.point, model.max_step
     for _ in range(HALVINGS):
-        finer = with_step(model, 0.5 * model.max_step)
+        finer = with_step(model, 0.5 * min(model.max_step, _usual_step(program)))
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
-        if np.max(_shift(program, fine, point), initial=0.0) <= SHIFT:
+        if not _matters(program, fine, point):
             break
         model, program = finer, fine
     if model.max_step == first:
@@ -55,16 +58,35 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
 
 
-def _shift(coarse: Program, fine: Program, point: Point) -> FloatArray:
-    """Return by how many standard errors a Gauss-Newton step moves each free parameter more on one than on the other.
+def _usual_step(program: Program) -> float:
+    """Return the median of the integrator steps that are taken, s: no longer than the intervals between samples."""
+    steps = [np.repeat(item.grid.dt / item.grid.substeps, item.grid.substeps) for item in program.experiments]
+    return float(np.median(np.concatenate([item[item > 0.0] for item in steps])))
 
-    Under misfit the standard errors grow with the residuals.
+
+def _matters(coarse: Program, fine: Program, point: Point) -> bool:
+    """Return whether half the step moves a parameter, or changes the residuals by what shows among them.
+
+    Under misfit the standard errors grow with the residuals, and so does what shows.
     """
+    samples = max(coarse.samples, 1)
+    before, after = (program.linearise(point) for program in (coarse, fine))
+    misfit = max(1.0, 2.0 * before.objective / samples)
+    if np.max(_shift(coarse, before, after, point), initial=0.0) > SHIFT * np.sqrt(misfit):
+        return True
+    residuals = (_residuals(program, point) for program in (coarse, fine))
+    changed = sum(float(np.sum((one - other) ** 2)) for one, other in zip(*residuals, strict=True))
+    return changed / samples > HALVED * np.sqrt(2.0 / samples) * misfit
+
+
+def _shift(coarse: Program, before: Linearisation, after: Linearisation, point: Point) -> FloatArray:
+    """Return by how many standard errors a Gauss-Newton step moves each free parameter further on one."""
     free = ~coarse.space.at_bounds(point.theta)
-    systems = [program.linearise(point) for program in (coarse, fine)]
-    reduced = [reduce_system(system, 1e-9) for system in systems]
+    reduced = [reduce_system(system, 1e-9) for system in (before, after)]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
-    samples = coarse.samples
-    misfit = max(1.0, 2.0 * systems[0].objective / max(samples, 1))
-    return np.abs(move) / np.sqrt(np.maximum(np.diag(told), 1e-300) * misfit)
+    return np.abs(move) / np.sqrt(np.maximum(np.diag(told), 1e-300))
+
+
+def _residuals(program: Program, point: Point) -> list[FloatArray]:
+    return [program.seen_errors(index, result.y) for index, result in enumerate(program.simulate_all(point))]

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from axes import COULOMB, INERTIA, VISCOUS
+from axes import COULOMB, CURRENT, INERTIA, POSITION, TORQUE_CONSTANT, VISCOUS, axis, problem
+from scipy.integrate import solve_ivp
 from stiff_axis import SIGMA0, stiff_problem
 
+from friction_ocp.drive.parts import Channel as Sensor
+from friction_ocp.drive.parts import Controller, Gravity
 from friction_ocp.estimation.fit import fit, settled
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare
+from friction_ocp.estimation.modes import STEP_PER_RADIAN
+from friction_ocp.parameters import Free
+from friction_ocp.recording.recording import Channel, Recording
 
 STILL = 0.1
 """Standard errors that half the step may move an estimate."""
@@ -60,3 +67,40 @@ def test_a_coarse_encoder_and_a_stated_step_are_left_alone() -> None:
     assert settled(coarse)[0].max_step == coarse.max_step
     stated = _model(1e-2, max_step=1e-3)
     assert settled(stated)[0].max_step == 1e-3
+
+
+def test_a_first_step_longer_than_the_samples_are_apart_is_shortened() -> None:
+    """A guess of the inertia 400 times too large makes the pendulum slow; the log is fitted at its own speed."""
+    interval, torque, noise = 0.02, 0.5, 3e-3
+    time = np.arange(0.0, 4.0, interval)
+
+    def rates(_: float, state: np.ndarray) -> list[float]:
+        return [state[1], -torque / INERTIA * np.sin(state[0])]
+
+    swing = solve_ivp(rates, (0.0, 4.0), [1.0, 0.0], t_eval=time, rtol=1e-10, atol=1e-10).y[0]
+    seen = Channel("position", time, swing + noise * np.random.default_rng(5).standard_normal(time.size), "rad")
+    still = Channel("current", time, 0.0 * time, "A")
+    drive = axis(inertia=Free(400.0 * INERTIA, 1e-2 * INERTIA, 1e4 * INERTIA), gravity=Gravity(torque))
+    drive = replace(drive, channels=(CURRENT, replace(POSITION, noise_std=noise)))
+    first = prepare(problem(drive, Recording("swing", {"current": still, "position": seen})))
+    assert first.max_step > 2.0 * interval
+    model, fitted = settled(first)
+    std_error = 1.0 / np.sqrt(influence(fitted.program, fitted.solution.point).information[0, 0])
+    assert model.max_step < 0.5 * interval
+    assert abs(fitted.solution.point.theta[0] - INERTIA) < FAR * std_error
+
+
+def test_a_loop_is_stepped_as_fast_as_it_is_near_its_set_point() -> None:
+    """Far from it the effort is at its limit, and nothing swings; the step does not hang on where the log begins."""
+    loop = Controller("duty", "position", "current", kp=50.0, saturation=(-1.0, 1.0))
+    wanted = Sensor("wanted", "reference.theta", role="input")
+    drive = replace(axis(inertia=Free(INERTIA)), channels=(wanted, POSITION), controller=loop)
+    time = np.arange(0.0, 2.0, 0.01)
+    position = Channel("position", time, np.sin(time), "rad")
+    recordings = [
+        Recording("run", {"wanted": Channel("wanted", time, far + np.sin(time), "rad"), "position": position})
+        for far in (0.0, 3.0)
+    ]
+    near, far = (prepare(problem(drive, recording)).max_step for recording in recordings)
+    assert far == near
+    assert near == pytest.approx(STEP_PER_RADIAN * np.sqrt(INERTIA / (50.0 * TORQUE_CONSTANT)), rel=1e-3)
