@@ -74,7 +74,7 @@ def is_dry(shaft: Shaft) -> bool:
 def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
     """Return the free Stribeck speed of friction that falls with the speed, and where it is tried, in rising order."""
     speed = clues.typical_speed(place)
-    tried = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
+    tried = sorted({*clues.speed_quantiles(place, (0.1, 0.3, 0.5, 0.8)), 0.01 * speed, 0.03 * speed, 0.1 * speed})
     return Free(tried[len(tried) // 2], 1e-2 * tried[0], 3.0 * speed), tried
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,13 +11,17 @@ import yaml
 from diagnosis_cases import ENCODER_STEP, STEP, axis, diagnosed, record, write_case
 from plant import Plant, PlantFriction, PlantSensor, PlantShaft, PlantTransmission
 
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.effects.registry import effects
+from friction_ocp.estimation.model import prepare
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.friction.law import AbstractFrictionLaw
 from friction_ocp.friction.static import CoulombViscous, NoFriction
 from friction_ocp.parameters import Free
+from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
 
 RATIO, LOAD, PLAY = 5.0, 0.05, 0.02
@@ -34,8 +37,8 @@ def geared(stiffness: float, play: float) -> Plant:
     return replace(plain, shafts=(*plain.shafts, load), transmissions=(gear,), sensors=(*plain.sensors, seen))
 
 
-def without_play(folder: Path, plant: Plant, rubs: bool = True) -> dict[str, Any]:
-    """Return the result document of a diagnosis whose model has a rigid gear, and behind it friction that `rubs`."""
+def without_play(folder: Path, plant: Plant, rubs: bool = True) -> Path:
+    """Write runs of a plant and a problem whose model has a rigid gear, and behind it friction that `rubs`."""
     path = write_case(folder, axis(), effects=["backlash", "compliance", "sensor_delay", "unbalance"])
     for k, name in enumerate("abc"):
         write_recording(record(plant, name, 10 + k), folder / f"{name}.h5")
@@ -45,13 +48,13 @@ def without_play(folder: Path, plant: Plant, rubs: bool = True) -> dict[str, Any
     document["drive"]["transmissions"] = [{"ratio": RATIO, "stiffness": "rigid"}]
     document["channels"]["load_position"] = {"measures": "load.theta", "resolution": ENCODER_STEP}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    return diagnosed(path)
+    return path
 
 
 @pytest.mark.slow
 def test_play_is_told_from_a_spring(tmp_path: Path) -> None:
     """Hard flanks with play between them are backlash, its size within a tenth."""
-    result = without_play(tmp_path, geared(3000.0, PLAY))
+    result = diagnosed(without_play(tmp_path, geared(3000.0, PLAY)))
     (accepted,) = result["accepted"]
     assert (accepted["effect"], accepted["component"]) == ("backlash", "motor-load")
     assert accepted["parameters"]["motor-load.backlash"]["value"] == pytest.approx(PLAY, rel=0.1)
@@ -60,7 +63,7 @@ def test_play_is_told_from_a_spring(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_spring_is_no_play(tmp_path: Path) -> None:
     """A soft joint without play is compliance: play that comes out as none takes nothing away from it."""
-    result = without_play(tmp_path, geared(40.0, 0.0))
+    result = diagnosed(without_play(tmp_path, geared(40.0, 0.0)))
     assert [(item["effect"], item["component"]) for item in result["accepted"]] == [("compliance", "motor-load")]
     assert not result["alias_sets"]
 
@@ -68,7 +71,7 @@ def test_a_spring_is_no_play(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_spring_with_friction_behind_it_is_one_effect(tmp_path: Path) -> None:
     """While a joint is rigid all its friction may stand on one side; once it gives, what rubs behind it comes along."""
-    result = without_play(tmp_path, geared(40.0, 0.0), rubs=False)
+    result = diagnosed(without_play(tmp_path, geared(40.0, 0.0), rubs=False))
     (accepted,) = result["accepted"]
     assert (accepted["effect"], accepted["component"]) == ("compliance", "motor-load")
     assert accepted["parameters"]["load.friction.tau_c"]["value"] == pytest.approx(0.1, rel=0.1)
@@ -116,6 +119,13 @@ def test_friction_that_is_there_already_stays_as_it_is(effect: str) -> None:
     found = effects()[effect].augment(rigid(CoulombViscous(0.5, 0.1)), "motor-load", seen())
     assert not any("friction" in path for path in found.off)
     assert not any("friction" in path for trial in found.trials for path in trial.fixed)
+
+
+def test_an_addition_builds_on_what_another_brought(tmp_path: Path) -> None:
+    """A joint that one effect made elastic grows stiffer by another, though the base model knows no stiffness."""
+    base = fit_base(prepare(load_problem(without_play(tmp_path, geared(40.0, 0.0)))))
+    drive = with_additions(base, [("compliance", "motor-load"), ("stiffening", "motor-load")])
+    assert drive.transmissions[0].second_stage is not None
 
 
 @pytest.mark.parametrize("effect", ["backlash", "stiffening", "transmission_hysteresis"])

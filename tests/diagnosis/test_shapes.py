@@ -181,6 +181,17 @@ def test_overtones_start_small_beside_a_wave_that_is_not_fitted_yet() -> None:
     assert sizes == pytest.approx([0.1 * small] * len(sizes))
 
 
+def test_stribeck_friction_is_tried_where_only_fast_moves_leave_it() -> None:
+    """A log that creeps most of the time may have friction that falls over all of its speeds: servos break away so."""
+    time, creeping, fast = 1e-3 * np.arange(1000), 0.1, 3.0
+    omega = np.where(time < 0.7, creeping, fast * time)
+    still = Missing(np.arange(2, 1000, 4), {"motor": np.zeros(250)}, {}, {})
+    track = Track(time, {"motor": np.cumsum(omega) * 1e-3}, {"motor": omega}, {"drive": np.ones(1000)}, still, still)
+    found = effects()["stribeck"].augment(geared(), "motor", Clues((track,), {}, {"motor": 1.0}))
+    tried = [value for trial in found.trials for path, value in trial.fixed.items() if path.endswith("omega_s")]
+    assert min(tried) < creeping < 0.5 * fast < max(tried)
+
+
 def test_other_effects_keep_their_shape() -> None:
     """An effect without a more general shape, or that the drive does not have, is added as the catalogue gives it."""
     drive, clues = geared(), Clues((), {}, {"motor": 0.1})
