@@ -6,7 +6,7 @@ is the stepped one (stepping.py).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -16,7 +16,7 @@ from friction_ocp.drive.coordinates import group_accelerations, group_angles, gr
 from friction_ocp.drive.holding import holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import losses, motor_loads, through_joint, transmitted_torque
-from friction_ocp.drive.mechanism import WARMTH, Mechanism, Motion, column, mechanism, symbol
+from friction_ocp.drive.mechanism import FEEDBACK_DELAY, WARMTH, Mechanism, Motion, column, mechanism, symbol
 from friction_ocp.drive.motors import extra_rates, following_rates
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import recorded
@@ -66,7 +66,7 @@ def dae(drive: Drive, width: float) -> Dae:
     if width <= 0:
         what = f"width = {width:g} rad/s leaves a jump that no integrator can pass"
         raise FrictionOcpError(Finding("dae", what, "width > 0", "use the stepped drive for exact friction"))
-    mech = mechanism(drive)
+    mech = _as_late_as_recorded(mechanism(drive))
     symbols = _symbols(mech)
     groups = group_angles(mech, symbols.angles), group_speeds(mech, symbols.speeds)
     at = Motion(*groups, symbols.extra, symbols.memory, symbols.following, symbols.loops, symbols.warmth)
@@ -191,4 +191,13 @@ def _input_unit(drive: Drive, name: str) -> str:
 
 def _parameters(drive: Drive, mech: Mechanism) -> tuple[Variable, ...]:
     units = {leaf.path: unit_of(leaf, drive) for leaf in drive_leaves(drive)}
-    return tuple(Variable(name, units[name], item) for name, item in mech.parameters.items())
+    return tuple(Variable(name, units[name], item) for name, item in mech.parameters.items() if name in units)
+
+
+def _as_late_as_recorded(mech: Mechanism) -> Mechanism:
+    """Return a mechanism whose controller sees its channel with the delay of the channel."""
+    controller = mech.drive.controller
+    if controller is None or FEEDBACK_DELAY not in mech.parameters:
+        return mech
+    delay = mech.parameters[f"{controller.feedback}.delay"]
+    return replace(mech, parameters={**mech.parameters, FEEDBACK_DELAY: delay})

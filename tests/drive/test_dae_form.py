@@ -178,10 +178,14 @@ def test_a_sampled_controller_holds_its_command_as_an_input() -> None:
     assert model.linearise(at).b[1] == pytest.approx([0.0, 50.0])
 
 
-def test_a_continuous_controller_closes_the_loop() -> None:
-    """The poles of a continuous PD loop over a viscous shaft are those of its characteristic polynomial."""
+@pytest.mark.parametrize("delay", [0.0, 2e-3])
+def test_a_continuous_controller_closes_the_loop(delay: float) -> None:
+    """The poles of a continuous PD loop over a viscous shaft are those of its characteristic polynomial.
+
+    A late angle takes from its damping.
+    """
     channels = (
-        Channel("angle", "axis.theta"),
+        Channel("angle", "axis.theta", delay=delay),
         Channel("reference", "reference.theta", "input"),
     )
     shaft = Shaft("axis", 0.01, FrictionElement(Viscous(0.05)))
@@ -189,7 +193,7 @@ def test_a_continuous_controller_closes_the_loop() -> None:
     drive = Drive((shaft,), (), (Motor("drive", "axis"),), controller, channels)
     at = values_of(drive) | {"axis.theta": 0.0, "axis.omega": 1.0, "reference": 0.0}
     poles = np.linalg.eigvals(dae(drive, WIDTH).linearise(at).a)
-    assert np.sort_complex(poles) == pytest.approx(np.sort_complex(np.roots([0.01, 0.1, 4.0])), rel=1e-8)
+    assert np.sort_complex(poles) == pytest.approx(np.sort_complex(np.roots([0.01, 0.1 - 4.0 * delay, 4.0])), rel=1e-8)
 
 
 def test_a_jump_is_refused() -> None:
