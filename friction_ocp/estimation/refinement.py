@@ -67,7 +67,8 @@ def _usual_step(program: Program) -> float:
 def _matters(coarse: Program, fine: Program, point: Point) -> bool:
     """Return whether half the step moves a parameter, or changes the residuals by what shows among them.
 
-    Under misfit the standard errors grow with the residuals, and so does what shows.
+    That is the standard deviation of the mean square of white residuals; a drive without a parameter that is free has
+    nothing else. Under misfit the standard errors grow with the residuals, and so does what shows.
     """
     samples = max(coarse.samples, 1)
     before, after = (program.linearise(point) for program in (coarse, fine))

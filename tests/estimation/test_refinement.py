@@ -69,25 +69,41 @@ def test_a_coarse_encoder_and_a_stated_step_are_left_alone() -> None:
     assert settled(stated)[0].max_step == 1e-3
 
 
-def test_a_first_step_longer_than_the_samples_are_apart_is_shortened() -> None:
-    """A guess of the inertia 400 times too large makes the pendulum slow; the log is fitted at its own speed."""
-    interval, torque, noise = 0.02, 0.5, 3e-3
-    time = np.arange(0.0, 4.0, interval)
+TORQUE, INTERVAL = 0.5, 0.02
+
+
+def swing(inertia: float | Free, noise: float) -> Model:
+    """Return a pendulum that swings freely for 4 s, its angle seen by an encoder of this noise."""
+    time = np.arange(0.0, 4.0, INTERVAL)
 
     def rates(_: float, state: np.ndarray) -> list[float]:
-        return [state[1], -torque / INERTIA * np.sin(state[0])]
+        return [state[1], -TORQUE / INERTIA * np.sin(state[0])]
 
-    swing = solve_ivp(rates, (0.0, 4.0), [1.0, 0.0], t_eval=time, rtol=1e-10, atol=1e-10).y[0]
-    seen = Channel("position", time, swing + noise * np.random.default_rng(5).standard_normal(time.size), "rad")
+    true = solve_ivp(rates, (0.0, 4.0), [1.0, 0.0], t_eval=time, rtol=1e-10, atol=1e-10).y[0]
+    seen = Channel("position", time, true + noise * np.random.default_rng(5).standard_normal(time.size), "rad")
     still = Channel("current", time, 0.0 * time, "A")
-    drive = axis(inertia=Free(400.0 * INERTIA, 1e-2 * INERTIA, 1e4 * INERTIA), gravity=Gravity(torque))
+    drive = axis(inertia=inertia, gravity=Gravity(TORQUE))
     drive = replace(drive, channels=(CURRENT, replace(POSITION, noise_std=noise)))
-    first = prepare(problem(drive, Recording("swing", {"current": still, "position": seen})))
-    assert first.max_step > 2.0 * interval
+    return prepare(problem(drive, Recording("swing", {"current": still, "position": seen})))
+
+
+def test_a_first_step_longer_than_the_samples_are_apart_is_shortened() -> None:
+    """A guess of the inertia 400 times too large makes the pendulum slow; the log is fitted at its own speed."""
+    first = swing(Free(400.0 * INERTIA, 1e-2 * INERTIA, 1e4 * INERTIA), 3e-3)
+    assert first.max_step > 2.0 * INTERVAL
     model, fitted = settled(first)
     std_error = 1.0 / np.sqrt(influence(fitted.program, fitted.solution.point).information[0, 0])
-    assert model.max_step < 0.5 * interval
+    assert model.max_step < 0.5 * INTERVAL
     assert abs(fitted.solution.point.theta[0] - INERTIA) < FAR * std_error
+
+
+def test_steps_are_shortened_where_nothing_is_fitted() -> None:
+    """A known drive has no parameter that they could move, but its residuals show them."""
+    first = swing(INERTIA, 3e-4)
+    model, fitted = settled(first)
+    assert model.max_step < first.max_step
+    cost = 2.0 * fitted.solution.objective / fitted.program.samples
+    assert cost == pytest.approx(1.0, abs=FAR * np.sqrt(2.0 / fitted.program.samples))
 
 
 def test_a_loop_is_stepped_as_fast_as_it_is_near_its_set_point() -> None:
