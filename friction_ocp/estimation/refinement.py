@@ -81,7 +81,7 @@ def _matters(coarse: Program, fine: Program, point: Point) -> bool:
 
 
 def _shift(coarse: Program, before: Linearisation, after: Linearisation, point: Point) -> FloatArray:
-    """Return by how many standard errors a Gauss-Newton step moves each free parameter further on one."""
+    """Return how far apart Gauss-Newton steps on both move each free parameter, in standard errors."""
     free = ~coarse.space.at_bounds(point.theta)
     reduced = [reduce_system(system, 1e-9) for system in (before, after)]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
