@@ -39,13 +39,15 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     if stated or isinstance(fitted.program.loss, Absolute):
         return model, fitted
     program, point, first = fitted.program, fitted.solution.point, model.max_step
+    system = program.linearise(point)
     for _ in range(HALVINGS):
         finer = with_step(model, 0.5 * min(model.max_step, _usual_step(program)))
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
-        if not _matters(program, fine, point):
+        after = fine.linearise(point)
+        if not _moves(program, system, after, point) and not _shows(program, fine, system, point):
             break
-        model, program = finer, fine
+        model, program, system = finer, fine, after
     if model.max_step == first:
         return model, fitted
     if may_be_cut(model, program):
@@ -64,29 +66,30 @@ def _usual_step(program: Program) -> float:
     return float(np.median(np.concatenate([item[item > 0.0] for item in steps])))
 
 
-def _matters(coarse: Program, fine: Program, point: Point) -> bool:
-    """Return whether half the step moves a parameter, or changes the residuals by what shows among them.
-
-    That is the standard deviation of the mean square of white residuals; a drive without a parameter that is free has
-    nothing else. Under misfit the standard errors grow with the residuals, and so does what shows.
-    """
-    samples = max(coarse.samples, 1)
-    before, after = (program.linearise(point) for program in (coarse, fine))
-    misfit = max(1.0, 2.0 * before.objective / samples)
-    if np.max(_shift(coarse, before, after, point), initial=0.0) > SHIFT * np.sqrt(misfit):
-        return True
-    residuals = (_residuals(program, point) for program in (coarse, fine))
-    changed = sum(float(np.sum((one - other) ** 2)) for one, other in zip(*residuals, strict=True))
-    return changed / samples > HALVED * np.sqrt(2.0 / samples) * misfit
+def _misfit(program: Program, system: Linearisation) -> float:
+    """Return the mean square of what is left over that of the noise, 1 at least: all that is uncertain grows by it."""
+    return max(1.0, 2.0 * system.objective / max(program.samples, 1))
 
 
-def _shift(coarse: Program, before: Linearisation, after: Linearisation, point: Point) -> FloatArray:
-    """Return how far apart Gauss-Newton steps on both move each free parameter, in standard errors."""
-    free = ~coarse.space.at_bounds(point.theta)
+def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point) -> bool:
+    """Return whether Gauss-Newton steps on both are further apart than SHIFT in any parameter that is free."""
+    free = ~program.space.at_bounds(point.theta)
     reduced = [reduce_system(system, 1e-9) for system in (before, after)]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
-    return np.abs(move) / np.sqrt(np.maximum(np.diag(told), 1e-300))
+    variance = np.maximum(np.diag(told), 1e-300) * _misfit(program, before)
+    return bool(np.max(np.abs(move) / np.sqrt(variance), initial=0.0) > SHIFT)
+
+
+def _shows(coarse: Program, fine: Program, before: Linearisation, point: Point) -> bool:
+    """Return whether the error of the coarse steps shows among the residuals, where a drive may have nothing to move.
+
+    What shows is as large as the standard deviation of the mean square of white residuals.
+    """
+    samples = max(coarse.samples, 1)
+    residuals = (_residuals(program, point) for program in (coarse, fine))
+    changed = sum(float(np.sum((one - other) ** 2)) for one, other in zip(*residuals, strict=True))
+    return changed / samples > HALVED * np.sqrt(2.0 / samples) * _misfit(coarse, before)
 
 
 def _residuals(program: Program, point: Point) -> list[FloatArray]:
