@@ -13,7 +13,7 @@ from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.simulation.grid import FloatArray
 
-STEP_PER_RADIAN = 0.05
+STEP_PER_RADIAN = 0.1
 """Integrator step over the inverse of the fastest oscillation."""
 STEP_PER_DECAY = 0.1
 """Integrator step over the shortest decay time."""
