@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as _linalg  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.estimation.factors import HELD
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.segments import Segments
 from friction_ocp.execution.effort import uncounted
@@ -18,8 +19,6 @@ from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 linalg: Any = _linalg  # its own types are incomplete
 
-HELD = (0.0, 1e-12, 1e-9, 1e-6, 1.0)
-"""Added in turn to a unit diagonal that rounding has left without factors; with the last one there are some."""
 MOST_KEPT = 2e9
 """Bytes of linearised programs that are kept in a process; what was longest not asked for is laid again when it is."""
 

@@ -10,6 +10,7 @@ from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.mechanism import WARMTH
 from friction_ocp.estimation.drive_noise import input_impulses, joining, joining_at
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.factors import inverse_roots
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.node_gaps import NodeGaps
 from friction_ocp.estimation.program import Program
@@ -42,8 +43,7 @@ def gap_weights(model: Model, item: Experiment, first: IntArray) -> FloatArray:
         noise = joining(model)
         return NodeGaps(model, noise, item, first, input_impulses(model, item, noise.numbers[item.name])).roots()
     shares = np.minimum(1.0, np.diff(first)[:-1] / model.problem.estimation.samples)
-    roots = np.linalg.inv(np.linalg.cholesky(gap_covariance(model, item, durations, shares)))
-    return np.asarray(roots, dtype=np.float64)
+    return inverse_roots(gap_covariance(model, item, durations, shares))
 
 
 def following(model: Model, program: Program) -> Program:

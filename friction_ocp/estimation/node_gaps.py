@@ -10,6 +10,7 @@ import numpy as np
 
 from friction_ocp.estimation.drive_noise import TorqueNoise, group_density, group_inertias, known_numbers, leaf_numbers
 from friction_ocp.estimation.experiment import Experiment
+from friction_ocp.estimation.factors import inverse_roots
 from friction_ocp.estimation.gathered_noise import alike, motions_of, slopes_about, unit_covariances
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.torque_noise import shown_speed, speed_ratio
@@ -74,7 +75,7 @@ class NodeGaps:
         part = np.minimum(1.0, self._spans / np.median(self._spans))[:, None, None]
         gathered: FloatArray = np.einsum("gs,gsij->sij", power, units[:, which])
         covariance = gathered + part * np.diag(self._still**2)
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance[:-1])), dtype=np.float64)
+        return inverse_roots(covariance[:-1])
 
     def _numbers(self, noise: TorqueNoise) -> FloatArray:
         return leaf_numbers(self.model, noise, self.item.name)
