@@ -167,9 +167,14 @@ def _is_open(rounds: Sequence[Round], index: int, accepted: Sequence[Key]) -> bo
 
 
 def _swapped(accepted: Sequence[Key], held: Key, rival: Key) -> list[Key]:
-    """Return additions with one in the place of another; the same effect elsewhere takes its more general shape on."""
+    """Return additions with one in the place of another; the same effect elsewhere takes its more general shape on.
+
+    What is there in a more general shape already does the work of both as it is.
+    """
     if rival[0] == held[0]:
         return [rival if other == held else other for other in accepted]
+    if accepted.count(rival) > 1:
+        return _less(accepted, held)
     first = accepted.index(held)
     return [rival if k == first else other for k, other in enumerate(accepted) if k == first or other != held]
 
@@ -223,8 +228,7 @@ def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection
     own = item.accepted.key
 
     def open_to(key: Key) -> bool:
-        times = accepted.count(key)
-        return times == 0 or (times == 1 and may_grow(_drive(bench, [key]), key, clues_of(bench.base)))
+        return key not in accepted or may_grow(_drive(bench, [key]), key, clues_of(bench.base))
 
     others = [rival for rival in item.choice.rivals if rival.key not in {own, *seen} and open_to(rival.key)]
     others = sorted(others, key=lambda rival: rival.standing.cost)

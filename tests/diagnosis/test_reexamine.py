@@ -92,6 +92,7 @@ def test_a_more_general_shape_goes_with_the_effect_to_another_place(tmp_path: Pa
     assert swapped([wave, other, wave], wave, ("cogging", "arm")) == [("cogging", "arm"), other, ("cogging", "arm")]
     assert swapped([wave, other, wave], wave, ("torque_ripple", "motor")) == [("torque_ripple", "motor"), other]
     assert swapped([wave, other], other, ("stribeck", "motor")) == [wave, ("stribeck", "motor")]
+    assert swapped([other, wave, wave], other, wave) == [wave, wave]
 
 
 def test_gravity_that_is_added_does_not_change_over_what_time_runs_are_judged(tmp_path: Path) -> None:
@@ -178,3 +179,23 @@ def test_what_may_grow_is_no_rival_of_itself(tmp_path: Path) -> None:
     assert kept == [waves, falling]
     assert sum(choice.probabilities) == pytest.approx(sum(rounds[0].choice.probabilities))
     assert choice.rivals[0].key == waves and choice.probabilities[0] > 1.0 - LEVEL
+
+
+@pytest.mark.slow
+def test_what_has_its_more_general_shape_may_still_do_the_work_of_two(tmp_path: Path) -> None:
+    """Cogging once a turn, with overtones, of which unbalance had taken the first order and a wave the others."""
+    plant = axis()
+    cogging = PlantRipple(2.0 * np.pi, (0.03, 0.02, 0.01), (0.01, 0.0, 0.01))
+    plant = replace(plant, motors=(replace(plant.motors[0], cogging=cogging),))
+    names = ("unbalance", "cogging")
+    bench = open_bench(load_problem(write_case(tmp_path, plant, effects=names)), HERE)
+    weight, wave = ((name, "motor") for name in names)
+    rounds, accepted = list[Round](), list[Key]()
+    for keys in ([weight, wave], [wave], [wave]):
+        rounds.append(round_of(bench, keys))
+        done = rounds[-1].accepted
+        assert done is not None
+        bench, accepted = bench.at(done.fitted), [*accepted, done.key]
+    current, _, kept = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
+    assert kept == [wave, wave] and "motor.gravity.torque" not in current.values
+    assert not excess(current.linear.rows, current.blocks).significant(LEVEL)
