@@ -35,6 +35,7 @@ from friction_ocp.quantities import si_unit
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
+MOTIONS = ("theta", "omega", "alpha")
 MOST_SHAPES = 4
 """How often an effect may be given a more general shape, at most."""
 
@@ -351,6 +352,7 @@ def _assumptions(diagnosis: Diagnosis, part: dict[str, Any] | None) -> list[str]
     if diagnosis.stated is not None:
         lines += corrections(diagnosis.stated, diagnosis.problem) + opened(diagnosis.stated, diagnosis.problem)
     lines.append("noise floors may be off by 5 %: what changes the error by less is no gap")
+    lines += sides(diagnosis.problem.drive)
     if part is not None:
         size, more = f"{part['samples']} of {part['of']} samples", "`samples` under `diagnosis:` takes more"
         lines.append(f"the search went by {size} of the training recordings, in {len(part['pieces'])} pieces: {more}")
@@ -363,4 +365,19 @@ def _assumptions(diagnosis: Diagnosis, part: dict[str, Any] | None) -> list[str]
     lines.append(f"the catalogue: {', '.join(meant.entries)}")
     left_out += [AT.join(key) for key in sorted(meant.excluded)]
     lines += [f"left out of the catalogue by the file: {', '.join(left_out)}"] if left_out else []
+    return lines
+
+
+def sides(drive: Drive) -> list[str]:
+    """Return what is assumed of sensors behind joints that are rigid in the model: which side they are on.
+
+    While a joint is rigid that makes no difference, and logs in the units of the load often come from its motor.
+    """
+    lines = list[str]()
+    shown = [channel for channel in drive.outputs if channel.signal in MOTIONS]
+    for joint in (item for item in drive.transmissions if item.rigid):
+        behind = [channel.name for channel in shown if channel.part == joint.to_shaft]
+        if behind and all(channel.part != joint.from_shaft for channel in shown):
+            before = f"a sensor before it measures `{joint.from_shaft}`, with the ratio in its `gain`"
+            lines.append(f"{', '.join(behind)}: behind {joint.name}, whose twist and play they show; {before}")
     return lines
