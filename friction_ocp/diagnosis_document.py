@@ -23,6 +23,7 @@ from friction_ocp.diagnosis.reading import corrections, with_additions
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import gave_shape, probabilities
 from friction_ocp.diagnosis.worth import innovations, samples
+from friction_ocp.drive.coordinates import ORDERS
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
@@ -35,7 +36,6 @@ from friction_ocp.quantities import si_unit
 from friction_ocp.result_document import heading, number, provenance
 
 FORMAT = "friction-ocp-diagnosis/1"
-MOTIONS = ("theta", "omega", "alpha")
 MOST_SHAPES = 4
 """How often an effect may be given a more general shape, at most."""
 
@@ -374,7 +374,7 @@ def sides(drive: Drive) -> list[str]:
     While a joint is rigid that makes no difference, and logs in the units of the load often come from its motor.
     """
     lines = list[str]()
-    shown = [channel for channel in drive.outputs if channel.signal in MOTIONS]
+    shown = [channel for channel in drive.outputs if channel.signal in ORDERS]
     for joint in (item for item in drive.transmissions if item.rigid):
         behind = [channel.name for channel in shown if channel.part == joint.to_shaft]
         if behind and all(channel.part != joint.from_shaft for channel in shown):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from friction_ocp.drafts.axis import Axis
+from friction_ocp.drive.coordinates import ORDERS
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.hdf5 import read_either
 from friction_ocp.recording.recording import Recording
@@ -104,7 +105,7 @@ def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[
             channels[name] = {"measures": "temperature", "role": "input"}
         elif unit == "1" and _ENABLE.search(name):
             channels[name] = {"measures": "motor.enable", "role": "input", "hold": "zero"}
-    if not any(item["measures"].split(".")[-1] in ("theta", "omega", "alpha") for item in channels.values()):
+    if not any(item["measures"].split(".")[-1] in ORDERS for item in channels.values()):
         what = f"no channel sees the motion: they are {_listed(units)}"
         raise FrictionOcpError(Finding(str(folder), what, "an angle, a speed or an acceleration"))
     return channels, driven_by

@@ -8,7 +8,8 @@ import casadi as ca
 
 from friction_ocp.drive.mechanism import Mechanism, column
 
-_ORDERS = ("theta", "omega", "alpha")
+ORDERS = ("theta", "omega", "alpha")
+"""Signals of a shaft's motion, by how often its angle is differentiated."""
 
 
 def group_angles(mech: Mechanism, angles: ca.SX) -> ca.SX:
@@ -33,7 +34,7 @@ def prescribed_motion(mech: Mechanism, group: int, signal: str) -> Any:
         if item.signal == mech.prescribed[group] and mech.topology.group_of.get(item.part) == group
     )
     ratio = mech.topology.speed_ratio[channel.part]
-    order = _ORDERS.index(signal) - _ORDERS.index(channel.signal)
+    order = ORDERS.index(signal) - ORDERS.index(channel.signal)
     value = mech.inputs[channel.name + order * "'"]
     return (value if order else value - channel.offset) / channel.gain / ratio
 

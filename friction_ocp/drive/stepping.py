@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from friction_ocp.drive.control import apply_tick, compute_tick
-from friction_ocp.drive.coordinates import group_accelerations, group_angles, group_speeds, pick
+from friction_ocp.drive.coordinates import ORDERS, group_accelerations, group_angles, group_speeds, pick
 from friction_ocp.drive.holding import drive_torque, holding_effort, holding_torques
 from friction_ocp.drive.inputs import TIME
 from friction_ocp.drive.kick import Step, Unknown, implicit_kick, losses, transmitted_torque
@@ -278,7 +278,7 @@ def _signal(
     mech: Mechanism, channel: Channel, at: Motion, acceleration: ca.SX, holding: Mapping[int, Any]
 ) -> tuple[Any, Any, Any]:
     """Return the true signal, and the first two time derivatives of an angle or a speed as far as they are known."""
-    if channel.signal in ("theta", "omega", "alpha"):
+    if channel.signal in ORDERS:
         theta, omega = mech.shaft_angle(channel.part, at), mech.shaft_speed(channel.part, at)
         alpha = mech.shaft_acceleration(channel.part, at, acceleration)
         if channel.eccentricity is not None:
