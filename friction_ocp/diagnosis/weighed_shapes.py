@@ -96,5 +96,5 @@ def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
         if item not in others and chances[item.key] > 0.0 and benchmark.simpler(item.standing)
     ]
     if shaped:
-        others += [item for item in choice.aliases if item.key[0] != held.key[0] and item not in others]
+        others += [item for item in choice.aliases if item.key != held.key and item not in others]
     return others
