@@ -12,6 +12,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.base_fit import fit_base, predicting
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.finer_steps import fitted_on, on_short_steps
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.linear import linear_program
@@ -25,7 +26,7 @@ from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.horizon import judged_alike
-from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
+from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late, with_step
 from friction_ocp.estimation.node_ends import UNIMPORTANT, begun
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point
@@ -156,15 +157,15 @@ class Bench:
 
 
 def point_document(fitted: FittedModel) -> Json:
-    """Return parameters and node states, and how late channels are read."""
-    point = fitted.linear.point
-    return plain({"theta": point.theta, "nodes": point.nodes, "late": late_of(fitted.model)})
+    """Return parameters and node states, how late channels are read, and the integrator step, s."""
+    point, model = fitted.linear.point, fitted.model
+    return plain({"theta": point.theta, "nodes": point.nodes, "late": late_of(model), "max_step": model.max_step})
 
 
 def seated(model: Model, foot: Footing, content: Json) -> FittedModel:
     """Return a fit where `point_document` says that it stands."""
     found = restored(content)
-    model = with_late(model, found["late"])
+    model = with_step(with_late(model, found["late"]), min(model.max_step, found["max_step"]))
     return FittedModel(model, foot, linear_program(foot.training(model), Point(found["theta"], found["nodes"])))
 
 
@@ -218,6 +219,15 @@ def sharpened(bench: Bench) -> Bench:
         return bench
     base = seen_on(found.footing, bench.base)
     return replace(bench, footing=footing_document(found.footing), base_point=point_document(base), seat=Seat.of(found))
+
+
+def stepped_finely(bench: Bench) -> Bench:
+    """Return the bench on integrator steps as short as the current model demands, the base model on the same."""
+    found = on_short_steps(bench.current)
+    if found is bench.current:
+        return bench
+    base = fitted_on(bench.base, found.model)
+    return replace(bench, base_point=point_document(base), seat=Seat.of(found))
 
 
 def opened_better(bench: Bench, execution: Execution) -> Bench:

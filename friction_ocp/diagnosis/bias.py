@@ -9,6 +9,7 @@ import numpy as np
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.units import unit_of
 from friction_ocp.drive.values import drive_leaves
+from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.simulation.grid import FloatArray
 
 REACH = 1.96
@@ -50,8 +51,8 @@ def standard_errors(fitted: FittedModel) -> FloatArray:
     rows = fitted.linear.rows
     scores = fitted.blocks.sums(rows.jacobian * rows.residual[:, None])
     hessian = rows.jacobian.T @ rows.jacobian
-    inverse = np.linalg.pinv(hessian, rcond=1e-14)
+    told, untold = inverse_information(hessian)
     count = len(scores)
     centred = (scores - scores.mean(axis=0)) * np.sqrt(count / max(count - 1, 1))
-    robust = inverse @ (centred.T @ centred) @ inverse
-    return np.sqrt(np.maximum(np.diag(robust), np.diag(inverse)))
+    robust = told @ (centred.T @ centred) @ told
+    return np.sqrt(np.maximum(np.diag(robust), np.diag(told)) + np.diag(untold))

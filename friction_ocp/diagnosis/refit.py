@@ -14,7 +14,7 @@ from friction_ocp.diagnosis.led_back import led_back
 from friction_ocp.diagnosis.polishing import QUICK, loosely, loosely_joined, polished, timed
 from friction_ocp.diagnosis.screen import Screened, Start
 from friction_ocp.drive.parts import Drive
-from friction_ocp.estimation.model import Model, with_drive
+from friction_ocp.estimation.model import Model, resolving, with_drive
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
@@ -122,7 +122,8 @@ def _outright(
 
 
 def _led_loosely(base: FittedModel, model: Model, values: Mapping[str, float]) -> FittedModel:
-    return timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK)
+    fine = resolving(model, model.space.clip(model.space.with_known(values)))
+    return timed(polished(fine, base.footing, loosely(fine, values), None, QUICK), QUICK)
 
 
 def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:
@@ -131,13 +132,14 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 
 
 def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
-    """Continue a refit to its end, around the kinks of exact friction that catch it.
+    """Continue a refit to its end, around the kinks of exact friction that catch it, on steps that resolve its motion.
 
     One that is still far from the recordings there lacks more than a way around kinks gives back: unless it is of
     segments and to be `thorough`, or of free runs that loosely joined segments do not lead, it is not freed until it is
     accepted, which most of those are not.
     """
-    ended = timed(polished(fitted.model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
+    model = resolving(fitted.model, fitted.theta)
+    ended = timed(polished(model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
     left = ended.astray and ended.footing.segment_s is not None and not thorough
     return ended if ended.leads_loosely or left else freed(ended)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better, sharpened
+from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better, sharpened, stepped_finely
 from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
@@ -288,8 +288,8 @@ class Search:
         self.tell("examining earlier additions again", 0.0)
         bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
-        self.bench = bench.at(current)
-        if innovations(current).significant(self.level) and not self._exhausted():
+        self.bench = stepped_finely(bench.at(current))
+        if innovations(self.bench.current).significant(self.level) and not self._exhausted():
             self._exchange()
 
     def _with(self, rival: Rival) -> Bench:

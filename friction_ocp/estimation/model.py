@@ -26,6 +26,8 @@ from friction_ocp.simulation.sweep import Sweep, sweep_of
 
 MOST_OF_ANOTHER = 100
 """The same for what is added to a drive, whose guesses suit a fit that may lie far from those of the rest."""
+SHORTENED = 16.0
+"""How many times shorter parameters that a fit has found make steps at most: a spring may be absurd on the way."""
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,15 @@ def with_step(model: Model, max_step: float) -> Model:
         tuple(_with_step(item, max_step, model.max_step) for item in items) for items in (model.train, model.validation)
     )
     return replace(model, train=train, validation=validation, max_step=max_step)
+
+
+def resolving(model: Model, theta: FloatArray) -> Model:
+    """Return a model whose integrator steps resolve the fastest mode at some parameters; the same if its own do."""
+    if model.problem.estimation.max_step is not None or not model.train:
+        return model
+    step = integrator_step(model.drive, model.space.moved(theta), model.problem, MOST_OF_ANOTHER)
+    step = max(step, model.max_step / SHORTENED)
+    return with_step(model, step) if step < model.max_step else model
 
 
 def laid_for(model: Model, found: Mapping[str, float]) -> Model:

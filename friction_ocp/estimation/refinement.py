@@ -35,10 +35,29 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     changes in the residuals may not show among them. How short they have to be is found at the fit with the first ones,
     and fitted once. Segments that noise joins stick or slide elsewhere with them.
     """
-    stated = model.problem.estimation.max_step is not None or not model.train
-    if stated or isinstance(fitted.program.loss, Absolute):
+    program, point = fitted.program, fitted.solution.point
+    finer, program = stepped_finely(model, program, point)
+    if finer is model:
         return model, fitted
-    program, point, first = fitted.program, fitted.solution.point, model.max_step
+    model = finer
+    if may_be_cut(model, program):
+        program, point = divided_afresh(model, program, point)
+        program = following(model, program)
+    watch = phases.begin(f"integrator step {model.max_step:.2g} s")
+    if model.joins_noise:
+        point = unstuck(model, program, point, watch)
+    end = solve_gauss_newton(program, point, limits(model), watch)
+    return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
+
+
+def stepped_finely(model: Model, program: Program, point: Point) -> tuple[Model, Program]:
+    """Return model and program with integrator steps that are short enough where a fit has ended; the same if they are.
+
+    Not where the problem states the step, or errors count by their size: those have no standard errors.
+    """
+    stated = model.problem.estimation.max_step is not None or not model.train
+    if stated or isinstance(program.loss, Absolute):
+        return model, program
     system = program.linearise(point)
     for _ in range(HALVINGS):
         finer = with_step(model, 0.5 * min(model.max_step, _usual_step(program)))
@@ -48,16 +67,7 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
         if not _moves(program, system, after, point) and not _shows(program, fine, system, point):
             break
         model, program, system = finer, fine, after
-    if model.max_step == first:
-        return model, fitted
-    if may_be_cut(model, program):
-        program, point = divided_afresh(model, program, point)
-        program = following(model, program)
-    watch = phases.begin(f"integrator step {model.max_step:.2g} s")
-    if model.joins_noise:
-        point = unstuck(model, program, point, watch)
-    end = solve_gauss_newton(program, point, limits(model), watch)
-    return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
+    return model, program
 
 
 def _usual_step(program: Program) -> float:
@@ -74,6 +84,8 @@ def _misfit(program: Program, system: Linearisation) -> float:
 def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point) -> bool:
     """Return whether Gauss-Newton steps on both are further apart than SHIFT in any parameter that is free."""
     free = ~program.space.at_bounds(point.theta)
+    if not np.any(free):
+        return False
     reduced = [reduce_system(system, 1e-9) for system in (before, after)]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]

@@ -17,6 +17,7 @@ from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.noise import noise_floor
 from friction_ocp.estimation.problem import Problem, RecordingUse
 from friction_ocp.estimation.stages import free_run
+from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.recording.recording import Recording
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
@@ -49,7 +50,8 @@ def evidence(fitted: FittedModel, recording: Recording) -> Evidence:
     residual, jacobian = linear.rows.residual[own], linear.rows.jacobian[own]
     known = _known(fitted, linear.program.space.names)
     pull = jacobian.T @ residual
-    closed = float(pull @ np.linalg.lstsq(jacobian.T @ jacobian + known, pull, rcond=1e-12)[0])
+    told, _ = inverse_information(jacobian.T @ jacobian + known)
+    closed = float(pull @ told @ pull)
     return Evidence(max(float(residual @ residual) - closed, 0.0))
 
 

@@ -11,6 +11,8 @@ from axes import COULOMB, CURRENT, INERTIA, POSITION, TORQUE_CONSTANT, VISCOUS, 
 from scipy.integrate import solve_ivp
 from stiff_axis import SIGMA0, stiff_problem
 
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.bench import Bench, Seat, footing_document, point_document
 from friction_ocp.drive.parts import Channel as Sensor
 from friction_ocp.drive.parts import Controller, Gravity
 from friction_ocp.estimation.fit import fit, settled
@@ -120,3 +122,14 @@ def test_a_loop_is_stepped_as_fast_as_it_is_near_its_set_point() -> None:
     near, far = (prepare(problem(drive, recording)).max_step for recording in recordings)
     assert far == near
     assert near == pytest.approx(STEP_PER_RADIAN * np.sqrt(INERTIA / (50.0 * TORQUE_CONSTANT)), rel=1e-3)
+
+
+def test_models_of_a_diagnosis_are_compared_on_steps_that_suffice(fine: Model) -> None:
+    """The base model's are shortened where its fit ends, and other processes build it, and what follows, with those."""
+    base = fit_base(fine)
+    assert base.model.max_step < fine.max_step
+    assert base.missed == pytest.approx(1.0, abs=0.1)
+    point = point_document(base)
+    bench = Bench(fine.problem, footing_document(base.footing), point, Seat.of(base))
+    assert bench.base.model.max_step == base.model.max_step
+    assert bench.base.objective == pytest.approx(base.objective, rel=1e-9)
