@@ -8,17 +8,22 @@ from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.refinement import stepped_finely
 
+SEARCHING = 1.0
+"""How far, in standard errors, half the step may move a parameter while models compete: no verdict hangs on that."""
 
-def on_short_steps(fitted: FittedModel) -> FittedModel:
+
+def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
     """Fit again on shorter integrator steps where the error of those that a fit was made with shows or moves it.
+
+    It moves it where half the step shifts a parameter by more than `shift` standard errors.
 
     The first step follows from the guesses, and a spring may be far harder. Not where a model is astray: there no
     step says more.
     """
     if fitted.astray or not fitted.holds:
         return fitted
-    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point)
-    return fitted if model is fitted.model else fitted_on(fitted, model)
+    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift)
+    return fitted if model is fitted.model else freed(fitted_on(fitted, model))
 
 
 def fitted_on(fitted: FittedModel, model: Model) -> FittedModel:
@@ -26,4 +31,4 @@ def fitted_on(fitted: FittedModel, model: Model) -> FittedModel:
     if fitted.model.max_step <= model.max_step:
         return fitted
     stepped = with_step(fitted.model, model.max_step)
-    return freed(timed(polished(stepped, fitted.footing, fitted.theta, fitted.linear.point.nodes)))
+    return timed(polished(stepped, fitted.footing, fitted.theta, fitted.linear.point.nodes))

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from friction_ocp.diagnosis.allowance import measured_out
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better, sharpened, stepped_finely
 from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
+from friction_ocp.diagnosis.finer_steps import SEARCHING
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
@@ -30,17 +31,12 @@ from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, req
 from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.execution.effort import effort
+from friction_ocp.estimation.refinement import SHIFT
 from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
-LONG = 300.0
-"""Seconds from which it is told beforehand how long a search may take."""
 NOTABLE = 0.05
 """Share of what is left by which another fit of the same model must be better to look for effects anew."""
-MOST_STEPS, MOST_RUNS = 2e9, 2900.0
-"""Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
-which nothing further is tried: about two minutes on two processors, and longer for logs of more than 130,000 steps."""
 INSTEAD = 2
 """Other effects, nearest first, from which the search goes on where the first addition leads nowhere."""
 HOPE = 0.25
@@ -66,8 +62,6 @@ class Search:
     accepted: list[Key] = field(default_factory=list[Key])
     taken_back: list[Round] = field(default_factory=list[Round])
     """Rounds that no longer count, with what they had added."""
-    cut_short: bool = False
-    """Whether the search ended at its limit of effort, with things left to try."""
     outdone: Problem | None = None
     """The problem with its inputs read another way, where that alone does more than any addition: no more is tried."""
     _begun: int = 0
@@ -76,14 +70,7 @@ class Search:
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
         self._left_out = LeftOut(self.run)
-        base, before, began = self.bench.base.linear, effort(), time.perf_counter()
-        base.program.linearise(base.point)
-        self._first, once, took = effort(), effort() - before, time.perf_counter() - began
-        self._most = self.patience * max(MOST_STEPS, MOST_RUNS * once)
-        longest = took * self._most / max(once, 1.0)
-        if longest > LONG:
-            shorter = "`effort` or `samples` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
-            self.tell(f"the search may take about {longest / 60.0:.0f} min on one processor; {shorter}", 0.0)
+        self._allowance = measured_out(self.bench.base, self.patience, self.tell)
 
     @property
     def fitted_base(self) -> FittedModel:
@@ -93,20 +80,18 @@ class Search:
     @property
     def effort(self) -> float:
         """What the search has taken, over what it may take."""
-        return (effort() - self._first) / self._most
+        return self._allowance.taken
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the search ended at its limit of effort, with things left to try."""
+        return self._allowance.spent
 
     @property
     def lost_its_way(self) -> bool:
         """Whether simulations of a model far off lead nowhere: nothing was added, or it stays far off with that."""
         base = self.bench.base
         return base.astray and not base.footing.predicted and (not self.accepted or self.bench.current.astray)
-
-    def _exhausted(self) -> bool:
-        """Whether nothing further is to be tried; whoever asks had something to try."""
-        if self.effort < 1.0:
-            return False
-        self.cut_short = True
-        return True
 
     def go(self) -> None:
         """Add until noise is left, nothing helps or the rounds are used up."""
@@ -131,7 +116,7 @@ class Search:
                 self._settle()
                 if not self._left_out.fall_short(self.bench):
                     break
-            if self._exhausted():
+            if self._allowance.exhausted():
                 break
         unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
         if unknown and len(set(self.accepted)) > 1:
@@ -141,6 +126,7 @@ class Search:
             self._withdraw()
         if self.accepted:
             self._sharpen()
+            self.bench = stepped_finely(self.bench, SHIFT)
 
     def _seems_missing(self, first: Round) -> bool:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
@@ -175,7 +161,7 @@ class Search:
         rival = next(iter(done.choice.rivals), None)
         if rival is None or current.cost - rival.standing.cost < MOST_OF * (current.cost - noise):
             return None
-        if not grows(rival, self.bench.clues) or self._exhausted():
+        if not grows(rival, self.bench.clues) or self._allowance.exhausted():
             return None
         bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
         grown = self._round(bench, keys, NONE)
@@ -188,7 +174,7 @@ class Search:
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""
         for way in (self._from_better, self._from_alias, self._reopened, self._from_rival):
-            done = None if not self.accepted or self._exhausted() else way()
+            done = None if not self.accepted or self._allowance.exhausted() else way()
             if done is not None:
                 return done
         return None
@@ -223,7 +209,7 @@ class Search:
         for rival in (*shown(last.choice.aliases), *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue
-            if self._exhausted():
+            if self._allowance.exhausted():
                 break
             tried.add(rival.key)
             bench, keys = self.bench.at(rival.fitted), [*before, rival.key]
@@ -248,7 +234,7 @@ class Search:
         tried = {item.key for item in shown(first.choice.aliases)}
         others = [item for item in first.choice.rivals if item.key[0] != held.key[0] and item.key not in tried]
         for rival in sorted(others, key=lambda item: item.standing.cost)[:INSTEAD]:
-            if self._exhausted():
+            if self._allowance.exhausted():
                 break
             bench = self.bench.at(rival.fitted)
             done = self._round(bench, [rival.key], self.meant)
@@ -269,7 +255,7 @@ class Search:
             held = item.accepted
             if held is None or self.accepted.count(held.key) != 1:
                 continue
-            if self._exhausted():
+            if self._allowance.exhausted():
                 break
             kept = [key for key in self.accepted if key != held.key]
             simpler = without_addition(current, with_additions(base, kept))
@@ -288,8 +274,8 @@ class Search:
         self.tell("examining earlier additions again", 0.0)
         bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
-        self.bench = stepped_finely(bench.at(current))
-        if innovations(self.bench.current).significant(self.level) and not self._exhausted():
+        self.bench = stepped_finely(bench.at(current), SEARCHING)
+        if innovations(self.bench.current).significant(self.level) and not self._allowance.exhausted():
             self._exchange()
 
     def _with(self, rival: Rival) -> Bench:
@@ -341,7 +327,7 @@ class Search:
         is_own = [item.accepted is not None and item.accepted.key == held for item in self.rounds]
         own = [item for item, yes in zip(self.rounds, is_own, strict=True) if yes]
         dropped = [item for item, yes in zip(self.rounds, is_own, strict=True) if not yes]
-        current, own = weighed_in_shape(self.bench, own, grown, self._exhausted, self.level, self.rng)
+        current, own = weighed_in_shape(self.bench, own, grown, self._allowance.exhausted, self.level, self.rng)
         self.bench, self.rounds = self.bench.at(current), [*dropped, *own]
         self.accepted = [item.accepted.key for item in own if item.accepted is not None]
 
@@ -388,7 +374,7 @@ class Search:
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         asked = {key: -np.inf if key in again else enough for key in known}
-        for rivals in completed_rivals(crew, chosen, unfitted, known, asked, self._exhausted):
+        for rivals in completed_rivals(crew, chosen, unfitted, known, asked, self._allowance.exhausted):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)

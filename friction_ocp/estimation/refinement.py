@@ -50,10 +50,11 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
 
 
-def stepped_finely(model: Model, program: Program, point: Point) -> tuple[Model, Program]:
+def stepped_finely(model: Model, program: Program, point: Point, shift: float = SHIFT) -> tuple[Model, Program]:
     """Return model and program with integrator steps that are short enough where a fit has ended; the same if they are.
 
-    Not where the problem states the step, or errors count by their size: those have no standard errors.
+    Half of them may move no parameter by more than a `shift` in standard errors. Not where the problem states the step,
+    or errors count by their size: those have no standard errors.
     """
     stated = model.problem.estimation.max_step is not None or not model.train
     if stated or isinstance(program.loss, Absolute):
@@ -64,7 +65,7 @@ def stepped_finely(model: Model, program: Program, point: Point) -> tuple[Model,
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
         after = fine.linearise(point)
-        if not _moves(program, system, after, point) and not _shows(program, fine, system, point):
+        if not _moves(program, system, after, point, shift) and not _shows(program, fine, system, point):
             break
         model, program, system = finer, fine, after
     return model, program
@@ -81,8 +82,8 @@ def _misfit(program: Program, system: Linearisation) -> float:
     return max(1.0, 2.0 * system.objective / max(program.samples, 1))
 
 
-def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point) -> bool:
-    """Return whether Gauss-Newton steps on both are further apart than SHIFT in any parameter that is free."""
+def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point, shift: float) -> bool:
+    """Return whether Gauss-Newton steps on both are further apart than a `shift` in any parameter that is free."""
     free = ~program.space.at_bounds(point.theta)
     if not np.any(free):
         return False
@@ -90,7 +91,7 @@ def _moves(program: Program, before: Linearisation, after: Linearisation, point:
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
     variance = np.maximum(np.diag(told), 1e-300) * _misfit(program, before)
-    return bool(np.max(np.abs(move) / np.sqrt(variance), initial=0.0) > SHIFT)
+    return bool(np.max(np.abs(move) / np.sqrt(variance), initial=0.0) > shift)
 
 
 def _shows(coarse: Program, fine: Program, before: Linearisation, point: Point) -> bool:

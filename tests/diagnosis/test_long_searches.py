@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 from diagnosis_cases import axis, write_case
 
-from friction_ocp.diagnosis import search as searches
+from friction_ocp.diagnosis import allowance
 from friction_ocp.diagnosis.bench import Bench, open_bench
 from friction_ocp.diagnosis.options import considered
+from friction_ocp.diagnosis.search import Search
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.statistics.execution import Execution
@@ -27,9 +28,7 @@ def test_a_long_search_is_announced(
 ) -> None:
     """With what makes it shorter; a short one is not."""
     lines = list[str]()
-    monkeypatch.setattr(searches, "LONG", long)
-    search = searches.Search(
-        bench, HERE, considered(bench.problem), 0.01, lambda what, share: lines.append(what), patience
-    )
+    monkeypatch.setattr(allowance, "LONG", long)
+    search = Search(bench, HERE, considered(bench.problem), 0.01, lambda what, share: lines.append(what), patience)
     assert len(lines) == told and all("may take about" in line and "`effort`" in line for line in lines)
     assert search.effort == 0.0
