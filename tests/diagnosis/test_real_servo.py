@@ -13,6 +13,14 @@ from friction_ocp.problem_file.load import load_problem
 PROBLEM = Path(__file__).parents[2] / "problems" / "xl330" / "coulomb_viscous.yaml"
 
 
+FOUND = {
+    True: (("torque_saturation", "servo"), ("load_dependence", "servo")),
+    False: (("load_dependence", "servo"),),
+}
+"""Free runs say for certain that torque falls with current, too, at the gain that is left out of a fit to the other
+one. At the third, which took no part, that is no help and no harm."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("stated", [True, False])
 def test_friction_that_grows_with_the_load_is_found_and_carries_over(stated: bool, tmp_path: Path) -> None:
@@ -28,6 +36,6 @@ def test_friction_that_grows_with_the_load_is_found_and_carries_over(stated: boo
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     found = diagnose(load_problem(path))
-    assert found.accepted == (("load_dependence", "servo"),)
+    assert found.accepted == FOUND[stated]
     assert found.closed.interval95[0] > 0.0
     assert found.left_over
