@@ -94,7 +94,12 @@ def test_other_effects_are_followed_where_the_only_addition_leads_nowhere(
     monkeypatch.setattr(search, "required", lambda base, current: 10.0)
     bench = SimpleNamespace(base=None, current=SimpleNamespace(cost=40.0, astray=False), at=lambda fitted: fitted)
     looking: Any = SimpleNamespace(
-        rounds=[first], bench=bench, accepted=[HELD], meant=None, _round=look, _exhausted=lambda: False
+        rounds=[first],
+        bench=bench,
+        accepted=[HELD],
+        meant=None,
+        _round=look,
+        _allowance=SimpleNamespace(exhausted=lambda: False),
     )
     done = Search._from_rival(looking)
     assert looked == [[RIVAL]]
