@@ -17,10 +17,10 @@ def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
 
     It moves it where half the step shifts a parameter by more than `shift` standard errors.
 
-    The first step follows from the guesses, and a spring may be far harder. Not where a model is astray: there no
-    step says more.
+    The first step follows from the guesses, and a spring may be far harder. Not where a model is astray,
+    or compared by short predictions because others of it were: there no step says more.
     """
-    if fitted.astray or not fitted.holds:
+    if fitted.astray or fitted.footing.predicted or not fitted.holds:
         return fitted
     model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift)
     return fitted if model is fitted.model else freed(fitted_on(fitted, model))

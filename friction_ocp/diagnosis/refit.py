@@ -122,8 +122,7 @@ def _outright(
 
 
 def _led_loosely(base: FittedModel, model: Model, values: Mapping[str, float]) -> FittedModel:
-    fine = resolving(model, model.space.clip(model.space.with_known(values)))
-    return timed(polished(fine, base.footing, loosely(fine, values), None, QUICK), QUICK)
+    return timed(polished(model, base.footing, loosely(model, values), None, QUICK), QUICK)
 
 
 def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> FittedModel:
@@ -132,13 +131,14 @@ def _steps(base: FittedModel, model: Model, program: Program, point: Point) -> F
 
 
 def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
-    """Continue a refit to its end, around the kinks of exact friction that catch it, on steps that resolve its motion.
+    """Continue a refit to its end, around the kinks of exact friction that catch it.
 
+    On steps that resolve its motion, unless it is far off: where such a fit ends no spring means anything.
     One that is still far from the recordings there lacks more than a way around kinks gives back: unless it is of
     segments and to be `thorough`, or of free runs that loosely joined segments do not lead, it is not freed until it is
     accepted, which most of those are not.
     """
-    model = resolving(fitted.model, fitted.theta)
+    model = fitted.model if fitted.astray else resolving(fitted.model, fitted.theta)
     ended = timed(polished(model, fitted.footing, fitted.theta, fitted.linear.point.nodes))
     left = ended.astray and ended.footing.segment_s is not None and not thorough
     return ended if ended.leads_loosely or left else freed(ended)
