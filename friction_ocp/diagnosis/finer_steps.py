@@ -15,10 +15,9 @@ SEARCHING = 1.0
 def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
     """Fit again on shorter integrator steps where the error of those that a fit was made with shows or moves it.
 
-    It moves it where half the step shifts a parameter by more than `shift` standard errors.
-
-    The first step follows from the guesses, and a spring may be far harder. Not where a model is astray,
-    or compared by short predictions because others of it were: there no step says more.
+    It moves it where half the step shifts a parameter by more than `shift` standard errors: the first step follows from
+    the guesses, and a spring may be far harder. Not where a model is astray, or compared by short predictions because
+    others of it were: there no step says more.
     """
     if fitted.astray or fitted.footing.predicted or not fitted.holds:
         return fitted
