@@ -221,7 +221,7 @@ def sharpened(bench: Bench) -> Bench:
     return replace(bench, footing=footing_document(found.footing), base_point=point_document(base), seat=Seat.of(found))
 
 
-def stepped_finely(bench: Bench, shift: float) -> Bench:
+def on_shorter_steps(bench: Bench, shift: float) -> Bench:
     """Return the bench on integrator steps as short as the current model demands, the base model on the same.
 
     Half of them may move a parameter by a `shift` in standard errors.

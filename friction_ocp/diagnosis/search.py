@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.allowance import measured_out
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, bettered, opened_better, sharpened, stepped_finely
+from friction_ocp.diagnosis.bench import Bench, Tell, bettered, on_shorter_steps, opened_better, sharpened
 from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
@@ -126,7 +126,7 @@ class Search:
             self._withdraw()
         if self.accepted:
             self._sharpen()
-            self.bench = stepped_finely(self.bench, SHIFT)
+            self.bench = on_shorter_steps(self.bench, SHIFT)
 
     def _seems_missing(self, first: Round) -> bool:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
@@ -274,7 +274,7 @@ class Search:
         self.tell("examining earlier additions again", 0.0)
         bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
-        self.bench = stepped_finely(bench.at(current), SEARCHING)
+        self.bench = on_shorter_steps(bench.at(current), SEARCHING)
         if innovations(self.bench.current).significant(self.level) and not self._allowance.exhausted():
             self._exchange()
 
