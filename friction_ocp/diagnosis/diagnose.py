@@ -115,7 +115,7 @@ class Diagnosis:
         """
         if self._comes_closer:
             return False
-        return self.after.drowned or strays_as_far(self.final, self.after, self.problem.estimation.seed)
+        return self.after.drowned or strays_as_far(self.final, self.after, self.problem.estimation.seed, self.level)
 
     @cached_property
     def lost(self) -> bool:

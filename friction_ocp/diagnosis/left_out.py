@@ -33,21 +33,21 @@ class LeftOut:
             self._runs = (bench.current, *_before_and_after(bench, self.run))
         return self._runs[1:]
 
-    def stray(self, bench: Bench) -> bool:
+    def stray(self, bench: Bench, level: float) -> bool:
         """Whether noise alone sets free runs of the current model as far apart."""
         if self._stray is None or self._stray[0] is not bench.current:
             _, after = self.errors(bench)
-            far = strays_as_far(bench.current, after, bench.problem.estimation.seed, held_out=False)
+            far = strays_as_far(bench.current, after, bench.problem.estimation.seed, level, held_out=False)
             self._stray = (bench.current, far)
         return self._stray[1]
 
-    def fall_short(self, bench: Bench) -> bool:
+    def fall_short(self, bench: Bench, level: float) -> bool:
         """Whether a notable part of their gap is left, and noise does not make it."""
-        return fall_short(*self.errors(bench)) and not self.stray(bench)
+        return fall_short(*self.errors(bench)) and not self.stray(bench, level)
 
     def helps(self, bench: Bench, level: float) -> bool:
         """Whether what the current model has and the base model lacks takes a part of the gap, and of theirs."""
-        return helps(bench.base, bench.current, level, lambda: self.errors(bench), lambda: self.stray(bench))
+        return helps(bench.base, bench.current, level, lambda: self.errors(bench), lambda: self.stray(bench, level))
 
 
 def _before_and_after(bench: Bench, run: Execution) -> tuple[FreeErrors, FreeErrors]:

@@ -114,7 +114,7 @@ class Search:
             self._take(done.accepted)
             if not innovations(self.bench.current).significant(self.level):
                 self._settle()
-                if not self._left_out.fall_short(self.bench):
+                if not self._left_out.fall_short(self.bench, self.level):
                     break
             if self._allowance.exhausted():
                 break

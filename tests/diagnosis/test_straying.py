@@ -5,21 +5,25 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import aries
 import pytest
 from diagnosis_cases import axis, diagnosed, with_stribeck, write_case
 
+from friction_ocp.diagnosis import straying
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.score import simulate_recordings
 from friction_ocp.friction.composite import SHARES
 from friction_ocp.problem_file.load import load_problem
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "problems" / "benchmarks"))
 import gaps
 
+LEVEL = 0.01
 RISE = {"law": "stribeck", "tau_s": 0.3, "omega_s": 0.5}
 
 
@@ -28,7 +32,7 @@ def test_what_a_model_lacks_is_more_than_noise_makes_of_free_runs(tmp_path: Path
     fitted = fit_base(prepare(load_problem(write_case(tmp_path, axis(**RISE)))))
     errors = free_errors(fitted, held_out=True)
     assert errors.excess() > 10.0
-    assert not strays_as_far(fitted, errors, 0)
+    assert not strays_as_far(fitted, errors, 0, LEVEL)
 
 
 @pytest.mark.parametrize(("held_out", "share"), [(True, 1.0), (False, 0.1)])
@@ -40,8 +44,26 @@ def test_what_noise_makes_of_free_runs_is_the_bound(tmp_path: Path, held_out: bo
     path = with_stribeck(write_case(tmp_path, axis(**RISE)), 0.3, 0.5)
     fitted = fit_base(prepare(load_problem(path)))
     errors = free_errors(fitted, held_out)
-    assert strays_as_far(fitted, replace(errors, power=share * errors.power), 0, held_out)
-    assert not strays_as_far(fitted, replace(errors, power=1e3 * errors.power), 0, held_out)
+    assert strays_as_far(fitted, replace(errors, power=share * errors.power), 0, LEVEL, held_out)
+    assert not strays_as_far(fitted, replace(errors, power=1e3 * errors.power), 0, LEVEL, held_out)
+
+
+@pytest.mark.parametrize(("times", "draws"), [(1e6, 19), (30.0, 99)])
+def test_noise_is_drawn_as_often_as_the_level_asks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, times: float, draws: int
+) -> None:
+    """Ninety-nine times at a level of a hundredth, and nineteen where what noise makes is far from the errors."""
+    path = with_stribeck(write_case(tmp_path, axis(**RISE)), 0.3, 0.5)
+    fitted = fit_base(prepare(load_problem(path)))
+    errors, calls = free_errors(fitted, held_out=True), list[int]()
+
+    def counted(*args: Any) -> Any:
+        calls.append(1)
+        return simulate_recordings(*args)
+
+    monkeypatch.setattr(straying, "simulate_recordings", counted)
+    assert not strays_as_far(fitted, replace(errors, power=times * errors.power), 0, LEVEL)
+    assert len(calls) == draws
 
 
 @pytest.mark.slow
