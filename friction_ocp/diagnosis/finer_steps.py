@@ -22,7 +22,16 @@ def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
     if fitted.astray or fitted.footing.predicted or not fitted.holds:
         return fitted
     model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift)
-    return fitted if model is fitted.model else freed(fitted_on(fitted, model))
+    return on_steps_of(model, fitted)
+
+
+def on_steps_of(model: Model, fitted: FittedModel) -> FittedModel:
+    """Fit on the integrator steps of another model, around the kinks there; the same if they are no shorter.
+
+    Of two fits on different steps the one on shorter ones costs less for that alone.
+    """
+    stepped = fitted_on(fitted, model)
+    return fitted if stepped is fitted else freed(stepped)
 
 
 def fitted_on(fitted: FittedModel, model: Model) -> FittedModel:

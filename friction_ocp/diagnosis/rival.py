@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from friction_ocp.diagnosis.exactness import exactness
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.effects.effect import Key
@@ -40,6 +41,8 @@ class Standing:
     lie where they mean that; only a refit that is to be added is asked."""
     prior: float = 0.0
     """What the distance of fitted values from stated ones costs."""
+    exactness: float = 0.0
+    """What it costs that periods, which might be any, came out as they did, beside the price of a parameter."""
 
     @classmethod
     def of(cls, fitted: FittedModel, material: bool = True) -> Standing:
@@ -47,7 +50,8 @@ class Standing:
         size = float(np.linalg.norm(_errors(fitted)))
         own = fitted.linear.rows
         prior = 0.5 * float(np.sum(own.residual[own.recording < 0] ** 2))
-        return cls(fitted.cost, fitted.objective, size, fitted.determined, fitted.values, material, prior)
+        exact = exactness(fitted)
+        return cls(fitted.cost, fitted.objective, size, fitted.determined, fitted.values, material, prior, exact)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.finer_steps import SEARCHING
+from friction_ocp.diagnosis.finer_steps import SEARCHING, on_steps_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
@@ -212,7 +212,7 @@ class Search:
             if self._allowance.exhausted():
                 break
             tried.add(rival.key)
-            bench, keys = self.bench.at(rival.fitted), [*before, rival.key]
+            bench, keys = self._on_steps(rival.fitted), [*before, rival.key]
             done = self._round(bench, keys, self.meant)
             if done.accepted is not None:
                 self.rounds[-1] = replace(last, choice=with_first(last.choice, rival), accepted=rival)
@@ -236,7 +236,7 @@ class Search:
         for rival in sorted(others, key=lambda item: item.standing.cost)[:INSTEAD]:
             if self._allowance.exhausted():
                 break
-            bench = self.bench.at(rival.fitted)
+            bench = self._on_steps(rival.fitted)
             done = self._round(bench, [rival.key], self.meant)
             if done.accepted is not None and current.cost - done.accepted.standing.cost >= enough:
                 self.rounds = [replace(first, choice=with_first(first.choice, rival), accepted=rival)]
@@ -280,7 +280,11 @@ class Search:
 
     def _with(self, rival: Rival) -> Bench:
         """Return the bench of a rival's model: one that is far off is freed only now that it is to be accepted."""
-        return self.bench.at(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
+        return self._on_steps(freed(rival.fitted) if rival.fitted.astray else rival.fitted)
+
+    def _on_steps(self, fitted: FittedModel) -> Bench:
+        """Return the bench of another model on the integrator steps of the current one."""
+        return self.bench.at(on_steps_of(self.bench.current.model, fitted))
 
     def _sharpen(self) -> None:
         """Go over additions again where channels show more than torque noise, on a footing that goes by that."""
@@ -321,7 +325,7 @@ class Search:
         """Weigh the only addition against others, each in the shape that the recordings give it."""
 
         def grown(rival: Rival) -> Round:
-            return self._round(self.bench.at(rival.fitted), [rival.key], NONE)
+            return self._round(self._on_steps(rival.fitted), [rival.key], NONE)
 
         held = self.accepted[0]
         is_own = [item.accepted is not None and item.accepted.key == held for item in self.rounds]

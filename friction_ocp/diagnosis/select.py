@@ -86,10 +86,10 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
 
     A rival's probability is its share of the likelihood of what was held out, on average over resampled blocks: where
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
-    parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), and its distance from
-    stated values what their priors say; rivals that leave the same residuals share what they have. Of an effect and one
-    that has all of it and more, the plain one comes first as long as it is not excluded, or where what the other has
-    more came out as nothing.
+    parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), a period more as it is
+    told more exactly, and its distance from stated values what their priors say; rivals that leave the same residuals
+    share what they have. Of an effect and one that has all of it and more, the plain one comes first as long as it is
+    not excluded, or where what the other has more came out as nothing.
     """
     if not rivals:
         return NOTHING
@@ -193,9 +193,7 @@ def _shared(rivals: Sequence[Rival], totals: FloatArray, whole: float, each: flo
     owner = list[int]()
     for k, rival in enumerate(rivals):
         owner.append(next((owner[j] for j in range(k) if is_same(rival, rivals[owner[j]])), k))
-    prices = np.array(
-        [each * item.standing.determined + item.standing.prior + float(_blames_sensor(item)) for item in rivals]
-    )
+    prices = np.array([_price(rival, each) for rival in rivals])
     shares = whole * _weights(totals - prices).mean(axis=0)
     found = list[float]()
     for k in range(len(rivals)):
@@ -203,6 +201,12 @@ def _shared(rivals: Sequence[Rival], totals: FloatArray, whole: float, each: flo
         part = _weights(-prices[None, own])[0][own.index(k)]
         found.append(float(np.sum(shares[own]) * part))
     return found
+
+
+def _price(rival: Rival, each: float) -> float:
+    """Return what a rival costs beside the likelihood of what was held out, `each` being what a parameter does."""
+    standing = rival.standing
+    return each * standing.determined + standing.prior + standing.exactness + float(_blames_sensor(rival))
 
 
 def _blames_sensor(rival: Rival) -> bool:

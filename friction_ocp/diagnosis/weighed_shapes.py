@@ -9,6 +9,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.bench import Bench
 from friction_ocp.diagnosis.benchmark import Benchmark
+from friction_ocp.diagnosis.finer_steps import on_steps_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.reexamine import gaining, weighed_again
 from friction_ocp.diagnosis.refit import MOST_OF
@@ -33,9 +34,11 @@ def weighed_in_shape(
     In the shape that the catalogue gives them the one may come nearer to what the other is on the machine, and a shape
     tells apart what was as likely before. `grown` is the round that gives a rival its more general shape. What explains
     more for certain takes the place, as does what explains the same with fewer parameters, or is the more probable;
-    what explains less for certain takes part no more, nor does what had the place, unless both say the same.
+    what explains less for certain takes part no more, nor does what had the place, unless both say the same: then it
+    is weighed like the others.
     """
     first, *shaped = rounds
+    first = _on_steps_of(bench.current, first)
     benchmark = Benchmark(bench.current)
     tried, shapes = list[Rival](), dict[Key, list[Round]]()
     for rival in _worth_weighing(first, bench, bool(shaped)):
@@ -49,7 +52,8 @@ def weighed_in_shape(
             held, choice = _held(first), with_first(first.choice, rival)
             same = is_same(rival.refitted(fitted, gains), held.refitted(benchmark.fitted, gains))
             first = replace(first, choice=choice if same else without(choice, {held.key}), accepted=rival)
-            shaped, benchmark = shapes[rival.key], Benchmark(fitted)
+            tried += [held.refitted(benchmark.fitted, gains)] if same else []
+            shapes[held.key], shaped, benchmark = shaped, shapes[rival.key], Benchmark(fitted)
             tried = gaining(tried, benchmark)
         elif fitted.cost > benchmark.fitted.cost + UNIMPORTANT and benchmark.certain(-gains, level, rng):
             first = replace(first, choice=without(first.choice, {rival.key}))
@@ -59,6 +63,28 @@ def weighed_in_shape(
     if leader is None:
         return benchmark.fitted, [first, *shaped]
     return leader.fitted, [first, *shapes[leader.key]]
+
+
+def _on_steps_of(current: FittedModel, first: Round) -> Round:
+    """Return a round with rivals that may take the place of its addition fitted on the steps of the current model.
+
+    That was put on shorter ones once it had been added.
+    """
+    choice, chances, held = first.choice, first.choice.chances, _held(first)
+    shown = {item.key for item in choice.aliases}
+    done = dict[int, Rival]()
+
+    def moved(item: Rival) -> Rival:
+        simpler = chances[item.key] > 0.0 and item.standing.determined < current.determined
+        if item.key == held.key or not (simpler or item.key in shown):
+            return item
+        if id(item) not in done:
+            fitted = on_steps_of(current.model, item.fitted)
+            done[id(item)] = item if fitted is item.fitted else item.refitted(fitted, item.gains)
+        return done[id(item)]
+
+    rivals, aliases, same = (tuple(map(moved, items)) for items in (choice.rivals, choice.aliases, choice.same))
+    return replace(first, choice=replace(choice, rivals=rivals, aliases=aliases, same=same))
 
 
 def _likeliest(shaped: Round) -> Round | None:

@@ -48,6 +48,16 @@ def test_stated_values_tell_equal_explanations_apart() -> None:
     assert choice.aliases == (light,)
 
 
+def test_a_period_that_comes_out_as_once_a_turn_is_that_of_an_unbalance() -> None:
+    """What might have had any period and leaves the same residuals is less likely by how exactly that is told."""
+    pull = rival("unbalance", "motor", {"motor.gravity.torque": 0.0})
+    wave = rival("cogging", "motor", {"motor.cogging.cosine": 0.0})
+    wave = replace(wave, standing=replace(wave.standing, exactness=8.0))
+    choice = chosen(wave, pull)
+    assert choice.rivals[0] is pull
+    assert choice.probabilities[0] / choice.probabilities[1] == pytest.approx(np.exp(8.0))
+
+
 def test_a_gain_outweighs_what_stated_values_cost() -> None:
     """However far stated values have to give way, what explains more than that costs is the likelier cause."""
     strange = rival("presliding", "motor", {"sigma0": 0.0}, prior=900.0, gain=50.0)
