@@ -37,11 +37,11 @@ def weighed_in_shape(
     what explains less for certain takes part no more, nor does what had the place, unless both say the same: then it
     is weighed like the others.
     """
-    first, *shaped = rounds
-    first = _on_steps_of(bench.current, first)
+    found, *shaped = rounds
+    first = _on_steps_of(bench.current, found)
     benchmark = Benchmark(bench.current)
     tried, shapes = list[Rival](), dict[Key, list[Round]]()
-    for rival in _worth_weighing(first, bench, bool(shaped)):
+    for rival in _worth_weighing(first, bench, bool(shaped) or first is not found):
         if exhausted():
             break
         done = _likeliest(grown(rival)) if grows(rival, bench.clues) else None
@@ -68,7 +68,7 @@ def weighed_in_shape(
 def _on_steps_of(current: FittedModel, first: Round) -> Round:
     """Return a round with rivals that may take the place of its addition fitted on the steps of the current model.
 
-    That was put on shorter ones once it had been added.
+    That was put on shorter ones once it had been added. The same round where they are not longer.
     """
     choice, chances, held = first.choice, first.choice.chances, _held(first)
     shown = {item.key for item in choice.aliases}
@@ -78,13 +78,13 @@ def _on_steps_of(current: FittedModel, first: Round) -> Round:
         simpler = chances[item.key] > 0.0 and item.standing.determined < current.determined
         if item.key == held.key or not (simpler or item.key in shown):
             return item
-        if id(item) not in done:
-            fitted = on_steps_of(current.model, item.fitted)
-            done[id(item)] = item if fitted is item.fitted else item.refitted(fitted, item.gains)
-        return done[id(item)]
+        fitted = item.fitted if id(item) in done else on_steps_of(current.model, item.fitted)
+        if fitted is not item.fitted:
+            done[id(item)] = item.refitted(fitted, item.gains)
+        return done.get(id(item), item)
 
-    rivals, aliases, same = (tuple(map(moved, items)) for items in (choice.rivals, choice.aliases, choice.same))
-    return replace(first, choice=replace(choice, rivals=rivals, aliases=aliases, same=same))
+    sets = {name: tuple(map(moved, getattr(choice, name))) for name in ("rivals", "aliases", "same")}
+    return replace(first, choice=replace(choice, **sets)) if done else first
 
 
 def _likeliest(shaped: Round) -> Round | None:
@@ -101,10 +101,10 @@ def _held(done: Round) -> Rival:
     return done.accepted
 
 
-def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
+def _worth_weighing(first: Round, bench: Bench, moved: bool) -> list[Rival]:
     """Return what resembles the addition and came half as near, the nearest of that, and what has fewer parameters.
 
-    And what it may be as well, where it was given a more general shape since.
+    And what it may be as well, where it was given a more general shape or shorter steps since: it has `moved`.
     """
     held, choice = _held(first), first.choice
     alike = effects()[held.key[0]].resembles
@@ -121,6 +121,6 @@ def _worth_weighing(first: Round, bench: Bench, shaped: bool) -> list[Rival]:
         for item in choice.rivals
         if item not in others and chances[item.key] > 0.0 and benchmark.simpler(item.standing)
     ]
-    if shaped:
+    if moved:
         others += [item for item in choice.aliases if item.key != held.key and item not in others]
     return others
