@@ -21,9 +21,9 @@ def exactness(fitted: FittedModel) -> float:
     space = fitted.model.space
     periodic = np.array([name.partition("@")[0].endswith(PERIOD) for name in space.names], dtype=bool)
     own = np.flatnonzero(periodic & (space.lower > 0.0) & np.isfinite(space.upper))
-    if not own.size:
-        return 0.0
     jacobian = fitted.linear.rows.jacobian
+    if not own.size or not np.all(np.isfinite(jacobian)):  # what breaks down has no errors, and no part in a choice
+        return 0.0
     told, untold = inverse_information(jacobian.T @ jacobian)
     error = np.sqrt((np.diag(told) + np.diag(untold))[own]) / np.abs(fitted.theta[own])
     most = np.log(space.upper[own] / space.lower[own])

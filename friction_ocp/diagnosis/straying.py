@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, excess_of
 from friction_ocp.estimation.drive_noise import input_noise
@@ -19,15 +21,14 @@ from friction_ocp.estimation.torque_noise import driving
 from friction_ocp.simulation.grid import FloatArray
 
 DRAWS = 19
-"""Draws of the noise whose mean is known well enough."""
+"""Draws of the noise from which it is told how far further ones may go."""
 
 
 def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: float, held_out: bool = True) -> bool:
     """Whether runs that noise sets apart part by as much as free runs err, of what was held out or fitted.
 
     At a level: one run in a hundred of the same kind passes the largest of 99. No more of them are simulated than that
-    takes, and few where the mean of what noise makes is so small a part of the errors that more cannot be as rare
-    (Markov's inequality).
+    takes, and few where the errors lie beyond what these tell of a further one (`_beyond`).
 
     A drive whose friction falls with speed, or that is about to stick, multiplies the least difference of its start and
     of its inputs: be its model as good as it may, its free runs tell little. Nothing is linearised: measurement and
@@ -48,9 +49,19 @@ def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: flo
         drawn.append(excess_of(ratios))
         if drawn[-1] >= most:
             return True
-        if len(drawn) >= DRAWS and np.mean(drawn) <= level * most:
+        if len(drawn) >= DRAWS and _beyond(most, drawn, level):
             break
     return False
+
+
+def _beyond(most: float, drawn: Sequence[float], level: float) -> bool:
+    """Whether a further draw would pass a value with less probability than a level, logarithms being normal.
+
+    By the prediction interval of Student's t; what is below the noise counts as that.
+    """
+    logs = np.log1p(np.array(drawn))
+    reach = float(stats.t.isf(level, logs.size - 1)) * float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / logs.size)
+    return math.log1p(most) > float(np.mean(logs)) + reach
 
 
 def _with_noise(model: Model, use: RecordingUse, levels: dict[str, float], rng: np.random.Generator) -> Experiment:

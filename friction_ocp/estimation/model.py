@@ -232,6 +232,11 @@ def resolving(model: Model, theta: FloatArray) -> Model:
     return with_step(model, step) if step < model.max_step else model
 
 
+def step_at_guesses(model: Model) -> float:
+    """Return the integrator step, s, that the fastest mode at the guesses asks for."""
+    return integrator_step(model.drive, model.space, model.problem)
+
+
 def laid_for(model: Model, found: Mapping[str, float]) -> Model:
     """Return a model whose gaps between segments and sizes of states are those that parameters by name call for."""
     after = replace(model, found=dict(found))

@@ -11,7 +11,7 @@ from friction_ocp.estimation.division import divided_afresh
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gap import following
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
-from friction_ocp.estimation.model import Model, with_step
+from friction_ocp.estimation.model import Model, step_at_guesses, with_step
 from friction_ocp.estimation.program import Linearisation, Point, Program
 from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rough_bowl import unstuck
@@ -53,15 +53,16 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
 def stepped_finely(model: Model, program: Program, point: Point, shift: float = SHIFT) -> tuple[Model, Program]:
     """Return model and program with integrator steps that are short enough where a fit has ended; the same if they are.
 
-    Half of them may move no parameter by more than a `shift` in standard errors. Not where the problem states the step,
-    or errors count by their size: those have no standard errors.
+    Half of them may move no parameter by more than a `shift` in standard errors. None is shorter than the first one,
+    that of the guesses, halved HALVINGS times: a mode that is faster may be absurd. Not where the problem states the
+    step, or errors count by their size: those have no standard errors.
     """
     stated = model.problem.estimation.max_step is not None or not model.train
     if stated or isinstance(program.loss, Absolute):
         return model, program
-    system = program.linearise(point)
-    for _ in range(HALVINGS):
-        finer = with_step(model, 0.5 * min(model.max_step, _usual_step(program)))
+    system, least = program.linearise(point), _first_step(model, program) / 2.0**HALVINGS
+    while (step := 0.5 * min(model.max_step, _usual_step(program))) > (1.0 - 1e-6) * least:
+        finer = with_step(model, step)
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
         after = fine.linearise(point)
@@ -75,6 +76,12 @@ def _usual_step(program: Program) -> float:
     """Return the median of the integrator steps that are taken, s: no longer than the intervals between samples."""
     steps = [np.repeat(item.grid.dt / item.grid.substeps, item.grid.substeps) for item in program.experiments]
     return float(np.median(np.concatenate([item[item > 0.0] for item in steps])))
+
+
+def _first_step(model: Model, program: Program) -> float:
+    """Return the integrator step at the guesses, s: no longer than the median interval between samples."""
+    intervals = np.concatenate([item.grid.dt[item.grid.dt > 0.0] for item in program.experiments])
+    return min(step_at_guesses(model), float(np.median(intervals)))
 
 
 def _misfit(program: Program, system: Linearisation) -> float:
