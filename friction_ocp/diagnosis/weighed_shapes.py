@@ -38,7 +38,7 @@ def weighed_in_shape(
     is weighed like the others.
     """
     found, *shaped = rounds
-    first = _on_steps_of(bench.current, found)
+    first = _on_equal_steps(bench.current, found)
     benchmark = Benchmark(bench.current)
     tried, shapes = list[Rival](), dict[Key, list[Round]]()
     for rival in _worth_weighing(first, bench, bool(shaped) or first is not found):
@@ -65,7 +65,7 @@ def weighed_in_shape(
     return leader.fitted, [first, *shapes[leader.key]]
 
 
-def _on_steps_of(current: FittedModel, first: Round) -> Round:
+def _on_equal_steps(current: FittedModel, first: Round) -> Round:
     """Return a round with rivals that may take the place of its addition fitted on the steps of the current model.
 
     That was put on shorter ones once it had been added. The same round where they are not longer.

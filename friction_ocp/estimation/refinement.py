@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from friction_ocp.estimation.progress import Phases
 from friction_ocp.estimation.rough_bowl import unstuck
 from friction_ocp.estimation.rounds import Fitted, limits
 from friction_ocp.estimation.uncertainty import inverse_information
-from friction_ocp.simulation.grid import FloatArray
+from friction_ocp.simulation.grid import FloatArray, Grid
 from friction_ocp.simulation.losses import Absolute
 
 SHIFT = 0.1
@@ -60,8 +61,9 @@ def stepped_finely(model: Model, program: Program, point: Point, shift: float = 
     stated = model.problem.estimation.max_step is not None or not model.train
     if stated or isinstance(program.loss, Absolute):
         return model, program
-    system, least = program.linearise(point), _first_step(model, program) / 2.0**HALVINGS
-    while (step := 0.5 * min(model.max_step, _usual_step(program))) > (1.0 - 1e-6) * least:
+    system, first = program.linearise(point), step_at_guesses(model)
+    least = _halved(first, [item.grid.with_step(first) for item in program.experiments]) / 2.0 ** (HALVINGS - 1)
+    while (step := _halved(model.max_step, [item.grid for item in program.experiments])) > (1.0 - 1e-6) * least:
         finer = with_step(model, step)
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
@@ -72,16 +74,10 @@ def stepped_finely(model: Model, program: Program, point: Point, shift: float = 
     return model, program
 
 
-def _usual_step(program: Program) -> float:
-    """Return the median of the integrator steps that are taken, s: no longer than the intervals between samples."""
-    steps = [np.repeat(item.grid.dt / item.grid.substeps, item.grid.substeps) for item in program.experiments]
-    return float(np.median(np.concatenate([item[item > 0.0] for item in steps])))
-
-
-def _first_step(model: Model, program: Program) -> float:
-    """Return the integrator step at the guesses, s: no longer than the median interval between samples."""
-    intervals = np.concatenate([item.grid.dt[item.grid.dt > 0.0] for item in program.experiments])
-    return min(step_at_guesses(model), float(np.median(intervals)))
+def _halved(longest: float, grids: Sequence[Grid]) -> float:
+    """Return half the median of the integrator steps that are taken, s: no longer than the intervals between samples."""
+    steps = [np.repeat(grid.dt / grid.substeps, grid.substeps) for grid in grids]
+    return 0.5 * min(longest, float(np.median(np.concatenate([item[item > 0.0] for item in steps]))))
 
 
 def _misfit(program: Program, system: Linearisation) -> float:
