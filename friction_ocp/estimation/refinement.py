@@ -75,7 +75,7 @@ def stepped_finely(model: Model, program: Program, point: Point, shift: float = 
 
 
 def _halved(longest: float, grids: Sequence[Grid]) -> float:
-    """Return half the median of the integrator steps that are taken, s: no longer than the intervals between samples."""
+    """Return half the median of the integrator steps that are taken, s: none is longer than the samples are apart."""
     steps = [np.repeat(grid.dt / grid.substeps, grid.substeps) for grid in grids]
     return 0.5 * min(longest, float(np.median(np.concatenate([item[item > 0.0] for item in steps]))))
 
