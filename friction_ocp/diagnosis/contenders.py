@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.crew import Crew
-from friction_ocp.diagnosis.rival import Rival
+from friction_ocp.diagnosis.rival import TOLD, Rival
 from friction_ocp.diagnosis.screen import Screened
 from friction_ocp.diagnosis.select import Round, gave_shape
 from friction_ocp.diagnosis.worth import samples, with_resembling
@@ -26,6 +26,9 @@ joined segments."""
 OF_LOST = 6
 """Candidates that are tried for what they promise of free runs that are lost, whatever that is: the order of such
 promises says little."""
+STAYS = 0.25
+"""Share of what a refit, or its prediction, leaves over noise that its end may leave of that: steps cut short and
+predictions both fall short where effects are large."""
 AS_NEAR = 0.01
 """Share of what the best completed refit leaves, of those that may be added, up to which what leaves more after a few
 steps is completed, too."""
@@ -134,7 +137,8 @@ def completed_rivals(
 ) -> Iterator[list[Rival]]:
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
-    What lost free runs promise is no prediction, and nothing is made thorough that is far behind there.
+    What lost free runs promise is no prediction, and nothing is made thorough that is far behind there. Nor is anything
+    completed at first that will not come as far as the best has come.
     What comes as near as the best that matters is completed beside it: what fits better and is not to be added leaves
     the field to that. What fits best where it was fitted may be worth nothing on recordings left out. Where it gains
     what is `asked` of it and yet will not do, it may have come to rest on the way: at last the best of those begin at
@@ -155,7 +159,9 @@ def completed_rivals(
     count, thorough = max(FINISHED, close), min(FINISHED, close) if current.leads_loosely else FINISHED
     order = sorted(range(len(hopes)), key=lambda k: (hopes[k], refits[k].cost))
     alike = effects()[refits[order[0]].key[0]].resembles
-    first = [k for rank, k in enumerate(order) if rank < count or refits[k].key[0] in alike]
+    enough = max(min(refit.cost for refit in refits) - noise, 0.0) + TOLD
+    hopeful = [k for k in order if k == order[0] or STAYS * (hopes[k] - noise) < enough]
+    first = [k for k in order if k in hopeful[:count] or refits[k].key[0] in alike]
     others = [k for k in order if k not in first]
     rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
     able = [item for item in rivals if item.standing.material] or rivals

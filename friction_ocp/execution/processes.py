@@ -20,12 +20,14 @@ from typing import Any
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.execution.executor import AbstractExecutor
+from friction_ocp.execution.processors import THREADS, Number, processors, take_share
 from friction_ocp.execution.task import Outcome, Task, attempt
 
 LINEAR_ALGEBRA = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 """Environment in which libraries of linear algebra that are loaded later get one thread."""
-ONE_THREAD = {"FRICTION_OCP_THREADS": "1", **LINEAR_ALGEBRA}
-"""Environment of a worker: the processors are shared out among the workers already."""
+ONE_THREAD = {THREADS: "1", **LINEAR_ALGEBRA}
+"""Environment of a worker: the processors are shared out among those that work."""
+CONTEXT = multiprocessing.get_context("spawn")
 PATIENCE = 5.0
 """Seconds that a worker has to end before it is killed."""
 
@@ -62,10 +64,14 @@ class _Worker:
 
 
 class _Team(AbstractExecutor):
-    """Workers, what each is doing, and what is left to do; they stay from one run to the next."""
+    """Workers, what each is doing, and what is left to do; they stay from one run to the next.
+
+    Together they take a processor for each; where few tasks are left, those at work take those of the others, too.
+    """
 
     def __init__(self, size: int, function: Callable[..., Any] | None) -> None:
         self._size, self._loaded = size, pickle.dumps(function)
+        self._most, self._each = min(size, processors()), CONTEXT.RawValue("i", 1)
         self._shared: Any = None
         self._packed, self._version = b"", 0
         self._waiting: list[Task] = []
@@ -89,11 +95,10 @@ class _Team(AbstractExecutor):
 
     def hire(self, count: int) -> None:
         """Start workers."""
-        context = multiprocessing.get_context("spawn")
         with environment(ONE_THREAD):
             for _ in range(count):
-                ours, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(theirs, self._loaded), daemon=True)
+                ours, theirs = CONTEXT.Pipe()
+                process = CONTEXT.Process(target=_serve, args=(theirs, self._loaded, self._each), daemon=True)
                 process.start()
                 theirs.close()
                 self._workers.append(_Worker(process, ours))
@@ -102,6 +107,7 @@ class _Team(AbstractExecutor):
         """Wait for any worker to speak or die; hand out the next tasks and return what has ended."""
         speaking = wait([worker.connection for worker in self._workers])
         heard = [self._hear(worker) for worker in self._workers.copy() if worker.connection in speaking]
+        self._share_out()
         return [outcome for outcome in heard if outcome is not None]
 
     def _hear(self, worker: _Worker) -> Outcome | None:
@@ -117,14 +123,21 @@ class _Team(AbstractExecutor):
         """Give the next task to a worker that is idle, with the shared argument where it has that of another run."""
         if not worker.ready or worker.task is not None or not self._waiting:
             return
-        task = self._waiting.pop()
+        task = worker.task = self._waiting.pop()
+        self._share_out()
         try:
             packed = self._packed if worker.version != self._version else None
             worker.connection.send_bytes(pickle.dumps((packed, task)))
         except OSError:  # it died while it was idle: whoever takes its place takes the task
             self._waiting.append(task)
+            worker.task = None
             return
-        worker.task, worker.version = task, self._version
+        worker.version = self._version
+
+    def _share_out(self) -> None:
+        """Give the processors to the workers that have a task."""
+        working = sum(worker.task is not None for worker in self._workers)
+        self._each.value = max(1, self._most // max(1, working))
 
     def _bury(self, worker: _Worker) -> Outcome | None:
         """Replace a worker that died; its task is lost."""
@@ -171,11 +184,12 @@ def environment(changes: dict[str, str]) -> Generator[None]:
                 os.environ[name] = value
 
 
-def _serve(connection: Connection, loaded: bytes) -> None:
-    """Work on tasks until the other end closes; Ctrl-C is for the parent to answer.
+def _serve(connection: Connection, loaded: bytes, threads: Number) -> None:
+    """Work on tasks until the other end closes, in as many threads as there are to be then; Ctrl-C is for the parent.
 
     What is `loaded` is a function, for the modules that it needs.
     """
+    take_share(threads)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     pickle.loads(loaded)

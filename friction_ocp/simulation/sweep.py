@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -14,6 +13,7 @@ from friction_ocp.drive.input_noise import with_input_noise
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.stepping import SteppedDrive, stepped
 from friction_ocp.execution.effort import count
+from friction_ocp.execution.processors import processors
 from friction_ocp.kept import kept
 from friction_ocp.simulation.compiled import compile_sweep
 from friction_ocp.simulation.grid import FloatArray, Grid, IntArray
@@ -76,7 +76,7 @@ class Sweep:
         results = [self._empty(request) for request in requests]
         pieces = [Piece(request, into, into.course) for request, into in zip(requests, results, strict=True)]
         count(BESIDE + sum(piece.effort for piece in pieces))
-        self.kernel.run(pieces, worker_count())
+        self.kernel.run(pieces, processors())
         return results
 
     def _empty(self, request: SweepRequest) -> SweepResult:
@@ -91,14 +91,6 @@ class Sweep:
 def sweep_of(drive: Drive, active: tuple[int, ...], values_only: bool = False, noisy: tuple[str, ...] = ()) -> Sweep:
     """Return the sweep of a drive, with the noise of `noisy` inputs as states; the last ones are kept."""
     return Sweep(with_input_noise(stepped(drive), noisy), active, values_only)
-
-
-def worker_count() -> int:
-    """Return how many threads may work: FRICTION_OCP_THREADS, else the processors of this process."""
-    stated = os.environ.get("FRICTION_OCP_THREADS", "")
-    if stated.isdigit():
-        return max(1, int(stated))
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def _start_with_slope(drive: SteppedDrive, active: Sequence[int]) -> ca.Function:

@@ -64,6 +64,15 @@ def test_the_best_come_first_and_the_others_if_those_will_not_do() -> None:
     assert turns == [["stribeck", "cogging", "polyline_break"]]
 
 
+def test_what_will_not_come_as_far_as_the_best_has_come_waits_until_that_will_not_do() -> None:
+    """Neither by a few steps nor by its prediction, even if its end leaves a quarter of what these do."""
+    left, promised, near = ("warm_up", 10.0, 1500.0), ("torque_ripple", 2485.0, 1500.0), ("unbalance", 10.0, 515.0)
+    best = ("cogging", 2400.0, 502.0)
+    assert completed(best, left) == [["cogging"], ["warm_up"]]
+    assert completed(best, left, exhausted=True) == [["cogging"]]
+    assert completed(best, left, promised, near) == [["cogging", "unbalance", "torque_ripple"], ["warm_up"]]
+
+
 def test_at_the_limit_of_effort_only_the_best_are_completed() -> None:
     """A search that has taken long enough does not go through what looks worse."""
     tried = (("cogging", 2400.0, 2000.0), ("unbalance", 100.0, 700.0), ("warm_up", 50.0, 2900.0))
@@ -94,7 +103,7 @@ def test_what_is_refused_leaves_the_field_to_what_comes_as_near_as_the_best_of_t
 
 def test_what_lost_runs_promise_counts_for_nothing() -> None:
     """Only what a few steps leave tells which refits are worth completing."""
-    tried = (("cogging", 2500.0, 2900.0), ("stribeck", 10.0, 700.0), ("unbalance", 10.0, 1500.0))
+    tried = (("cogging", 2500.0, 2900.0), ("stribeck", 10.0, 700.0), ("unbalance", 10.0, 1300.0))
     assert completed(*tried, lost=True) == [["stribeck", "unbalance"], ["cogging"]]
     assert completed(*tried)[0][0] == "cogging"
 

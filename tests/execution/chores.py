@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from friction_ocp.execution.effort import count
+from friction_ocp.execution.processors import processors
+
+PATIENCE = 30.0
+"""Seconds to wait for another task."""
 
 
 def noted(folder: Path, name: str, value: float) -> dict[str, float]:
@@ -49,3 +54,29 @@ def counting(folder: Path, work: float) -> float:
     if work < 0.0:
         raise ValueError("no work at all")
     return work
+
+
+def taking_processors(folder: Path, name: str, others: list[str]) -> list[int]:
+    """Return how many processors this may take beside others, and how many once they have ended.
+
+    The one called `long` waits for that.
+    """
+
+    def have(what: str) -> bool:
+        done = (folder / "done").read_text(encoding="utf-8").split()
+        return all(f"{other}-{what}" in done for other in others)
+
+    noted(folder, f"{name}-begun", 0.0)
+    _wait_for(lambda: have("begun"))
+    beside = processors()
+    noted(folder, f"{name}-looked", 0.0)
+    _wait_for(lambda: have("looked"))
+    if name == "long":
+        _wait_for(lambda: processors() != beside)
+    return [beside, processors()]
+
+
+def _wait_for(happened: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE
+    while not happened() and time.monotonic() < until:
+        time.sleep(0.01)

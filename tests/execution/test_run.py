@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from chores import dying, environment, failing, noted, slowly_noted
+from chores import dying, environment, failing, noted, slowly_noted, taking_processors
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.execution.executor import AbstractExecutor, InProcess, executor_of
@@ -117,6 +117,28 @@ def test_workers_do_not_share_out_processors_again(tmp_path: Path) -> None:
     found = run([Task("threads", environment, ("FRICTION_OCP_THREADS",))], tmp_path, SPAWNED)
     assert found["threads"].value == "1"
     assert dict(os.environ) == before
+
+
+def test_the_last_at_work_takes_the_processors_of_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers share the processors out among those that have a task; when one is left it takes them all."""
+    monkeypatch.setenv("FRICTION_OCP_THREADS", "2")
+    tasks = [
+        Task("long", taking_processors, ("long", ["short"])),
+        Task("short", taking_processors, ("short", ["long"])),
+    ]
+    found = run(tasks, tmp_path, SPAWNED)
+    assert found["long"].value == [1, 2]
+    assert found["short"].value[0] == 1
+
+
+def test_a_lone_task_takes_no_more_processors_than_are_stated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever states one thread has one, however many workers there are."""
+    for stated, expected in (("1", 1), ("2", 2), ("64", 2)):
+        monkeypatch.setenv("FRICTION_OCP_THREADS", stated)
+        folder = tmp_path / stated
+        folder.mkdir()
+        found = run([Task("alone", taking_processors, ("alone", []))], folder, SPAWNED)
+        assert found["alone"].value == [expected, expected]
 
 
 def test_one_worker_is_this_process() -> None:
