@@ -8,8 +8,6 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
-
 from friction_ocp.cli import (
     checking,
     diagnosing,
@@ -23,21 +21,19 @@ from friction_ocp.cli import (
 )
 from friction_ocp.cli.options import DONE, INTERRUPTED, NOT_CONVERGED, WRONG_INPUT, Parser
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.execution.processes import LINEAR_ALGEBRA, environment
+from friction_ocp.execution.linear_algebra import LINEAR_ALGEBRA, with_one_thread
+from friction_ocp.execution.processes import environment
 
 __all__ = ["DONE", "INTERRUPTED", "NOT_CONVERGED", "WRONG_INPUT", "main"]
 
 
+@with_one_thread
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status.
-
-    The linear algebra gets one thread: its matrices are small, and threads that wait for each other on a busy machine
-    take many times as long, and round otherwise than workers do. Work is shared out by segments and by tasks.
-    """
+    """Run one command and return its exit status."""
     options = _parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        with environment(LINEAR_ALGEBRA), threadpool_limits(1, user_api="blas"):
+        with environment(LINEAR_ALGEBRA):
             return options.run(options)
     except FrictionOcpError as error:
         for finding in error.findings:

@@ -31,6 +31,7 @@ from friction_ocp.effects.stated_values import STATED
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import InProcess
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.statistics.execution import Execution
 
 MOST_PARTS = 4
@@ -179,6 +180,7 @@ class Diagnosis:
         return "undecided" if self.alias_sets else "explained"
 
 
+@with_one_thread
 def diagnose(
     problem: Problem, tell: Tell = lambda what, share: None, execution: Execution = Execution(InProcess())
 ) -> Diagnosis:

@@ -32,6 +32,7 @@ from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.unknown_noise import MOST_SAMPLES
 from friction_ocp.estimation.warnings import warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, told_by_rounding, whiteness
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
 
@@ -115,6 +116,7 @@ class Interrupted(Exception):
         self.estimate = estimate
 
 
+@with_one_thread
 def identify(problem: Problem, progress: Progress = silent) -> Estimate:
     """Fit every parameter of a problem that has a guess.
 
@@ -211,6 +213,7 @@ def _missed_warning(fit: StaticFit) -> str:
     )
 
 
+@with_one_thread
 def simulate(problem: Problem) -> Simulation:
     """Simulate all recordings freely with the guesses of a problem.
 

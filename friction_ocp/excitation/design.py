@@ -23,6 +23,7 @@ from friction_ocp.excitation.motions import MOTIONS
 from friction_ocp.excitation.trial_run import TrialRun, refuse_what_is_not_driven, trial_run
 from friction_ocp.excitation.worth import information, known_information
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.run import Tally
 from friction_ocp.simulation.grid import FloatArray
 
@@ -60,6 +61,7 @@ class Design:
     """Candidates that were named to be told apart."""
 
 
+@with_one_thread
 def design(
     problem: Problem,
     criterion: Criterion = "D",

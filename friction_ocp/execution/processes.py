@@ -20,11 +20,10 @@ from typing import Any
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.execution.executor import AbstractExecutor
+from friction_ocp.execution.linear_algebra import LINEAR_ALGEBRA
 from friction_ocp.execution.processors import THREADS, Number, processors, take_share
 from friction_ocp.execution.task import Outcome, Task, attempt
 
-LINEAR_ALGEBRA = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-"""Environment in which libraries of linear algebra that are loaded later get one thread."""
 ONE_THREAD = {THREADS: "1", **LINEAR_ALGEBRA}
 """Environment of a worker: the processors are shared out among those that work."""
 CONTEXT = multiprocessing.get_context("spawn")

@@ -11,6 +11,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.executor import AbstractExecutor
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.processes import Processes
 from friction_ocp.execution.run import Watch, run_tasks, unwatched
 from friction_ocp.fleet.fits import FleetLedger, fit_key, problem_fingerprint, task_of, template_of
@@ -43,6 +44,7 @@ class Fleet:
     """Attribute with times, as stated."""
 
 
+@with_one_thread
 def batch(
     problem: Problem,
     recordings: Sequence[Path],

@@ -7,6 +7,7 @@ from itertools import chain
 
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.problem_file.rules import (
     dissipation,
     excitation,
@@ -33,6 +34,7 @@ _DOUBTS = (*recordings.RECORDINGS, *static.STATIC, *excitation.EXCITATION)
 _BEFORE_FIT = (*WHOLE, *excitation.FIT, *plausibility.PLAUSIBILITY, *timing.TIMING, *work.WORK)
 
 
+@with_one_thread
 def check(problem: Problem) -> tuple[Finding, ...]:
     """Return everything that is wrong (errors) or doubtful (warnings) about a problem, in the order of the file.
 

@@ -16,6 +16,7 @@ from friction_ocp.estimation.influence import Influence, influence
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.task import Json, Task
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.answer import Answer, answer
@@ -67,6 +68,7 @@ class Bootstrap:
         return np.percentile(self.draws, PERCENTILES, axis=0).T
 
 
+@with_one_thread
 def bootstrap(problem: Problem, draws: int = DEFAULT_DRAWS, execution: Execution = Execution()) -> Bootstrap:
     """Fit a problem and draw its estimate again and again from resampled residuals.
 

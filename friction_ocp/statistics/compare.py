@@ -14,6 +14,7 @@ from friction_ocp.estimation.estimate import Estimate
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.execution.content import fingerprint
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.statistics.answer import answer
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.lead import Lead, held_out_lead
@@ -50,6 +51,7 @@ class Comparison:
     warnings: tuple[str, ...]
 
 
+@with_one_thread
 def compare(
     problems: Sequence[Problem], nested: Sequence[tuple[str, str]] = (), execution: Execution = Execution()
 ) -> Comparison:

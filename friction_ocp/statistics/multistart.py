@@ -11,6 +11,7 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.starts import start_points
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.answer import align, concluded, fit_start
@@ -71,6 +72,7 @@ class MultiStart:
         return tuple(texts)
 
 
+@with_one_thread
 def multistart(problem: Problem, starts: int | None = None, execution: Execution = Execution()) -> MultiStart:
     """Fit a problem from its guess and from other starts within a factor sqrt(10).
 

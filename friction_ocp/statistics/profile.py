@@ -14,6 +14,7 @@ from friction_ocp.estimation.estimate import Estimate, ParameterEstimate
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.uncertainty import CONFIDENCE, uncertainty
+from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.answer import Answer, answer
@@ -66,6 +67,7 @@ class Profiles:
     warnings: tuple[str, ...]
 
 
+@with_one_thread
 def profile(problem: Problem, parameters: Sequence[str] = (), execution: Execution = Execution()) -> Profiles:
     """Fit a problem and profile its likelihood along each fitted parameter, or along those named.
 

@@ -17,7 +17,7 @@ from blind.judging import Judged, judge, named
 from blind.picture import draw_confusion
 from blind.recording import run
 from blind.running import Failed, diagnosed, reached
-from blind.score import NOTHING, purpose
+from blind.score import NOTHING, purpose, timed_alone
 from blind.summary import Checked, Line, confusion, summary
 
 from friction_ocp import load_problem
@@ -217,6 +217,23 @@ def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
     """A diagnosis that ends without a result carries the words of the command."""
     with pytest.raises(Failed, match=r"exit status 1.*missing\.yaml"):
         diagnosed(tmp_path / "missing.yaml", tmp_path / "out")
+
+
+def test_what_took_too_long_beside_another_is_timed_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In as many processes as worked on both, in a folder of its own; what fails there keeps its time."""
+    asked = list[tuple[Path, Path, int]]()
+
+    def diagnosed_again(problem: Path, folder: Path, workers: int) -> tuple[dict[str, Any], float]:
+        asked.append((problem.relative_to(tmp_path), folder.relative_to(tmp_path), workers))
+        if len(asked) > 1:
+            raise Failed("no answer within 900 s")
+        return {}, 150.0
+
+    monkeypatch.setattr("blind.score.diagnosed", diagnosed_again)
+    row = judged(answer("one", "cogging"), result("explained", "cogging"), 230.0)
+    assert timed_alone(row, tmp_path, 2) == replace(row, seconds=150.0)
+    assert timed_alone(row, tmp_path, 2) == row
+    assert asked[0] == (Path("cases", row.case, "problem.yaml"), Path("alone", row.case), 2)
 
 
 def test_shrinkage_is_measured_on_fresh_recordings(tmp_path: Path) -> None:
