@@ -99,7 +99,7 @@ def _unpacked(content: bytes) -> Any:
 
 
 def _done(task: bytes, shared: Any) -> Outcome:
-    """Do a task on a worker: one at a time in a process, on one thread, as local workers do."""
+    """Do a task on a worker: one at a time in a process, on one thread."""
     with _one_at_a_time:
         os.environ.update(ONE_THREAD)
         return attempt(pickle.loads(task), shared)
