@@ -14,9 +14,11 @@ from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.parameter_space import parameter_space
 from friction_ocp.estimation.problem import RecordingUse
+from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
@@ -25,6 +27,8 @@ from friction_ocp.simulation.losses import Squares
 ENOUGH = Tolerances(max_iterations=30)
 MOST_STARTS = 3
 """From which they are fitted."""
+MOST_PASSES = 4
+"""Of all starts on the nodes of the nearest."""
 ORIGIN, PERIOD = "origin", "period"
 """How the names end of where a wave begins and of its period."""
 
@@ -104,9 +108,25 @@ def _fitted(
     numbers = {leaf.path: leaf.value for leaf in drive_leaves(shared)}
     begins = [space.clip(begin) for start in others for begin in _at_other_crests(start, paths, numbers)]
     starts = [solve_nodes(program, suggested_point(program, begin)) for begin in _different(begins)]
-    nearest = sorted(starts, key=program.objective)[:MOST_STARTS]
+    nearest = _on_the_best_nodes(program, starts)[:MOST_STARTS]
     best = min((solve_gauss_newton(program, start, ENOUGH) for start in nearest), key=lambda end: end.objective)
     return dict(zip(paths, map(float, best.point.theta), strict=True))
+
+
+def _on_the_best_nodes(program: Program, starts: Sequence[Point]) -> list[Point]:
+    """Return starts, the nearest first, each with its own nodes or those that the nearest of all leads to.
+
+    Dry friction leaves nodes at ends of their own, which differ by more than what short segments tell of the numbers.
+    """
+    found = list(starts)
+    for _ in range(MOST_PASSES):
+        best = min(found, key=program.objective)
+        before, nodes = program.objective(best), best.nodes
+        led = [item if item is best else solve_nodes(program, Point(item.theta, nodes)) for item in found]
+        found = [min(pair, key=program.objective) for pair in zip(found, led, strict=True)]
+        if before - min(map(program.objective, found)) < UNIMPORTANT:
+            break
+    return sorted(found, key=program.objective)
 
 
 def _at_other_crests(start: FloatArray, paths: Sequence[str], numbers: Mapping[str, Any]) -> Iterator[FloatArray]:

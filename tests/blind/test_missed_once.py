@@ -32,6 +32,10 @@ MISSED: dict[str, tuple[int, int, Found]] = {
         *(20261209, 121),
         [("periodic_disturbance", "motor")],
     ),
+    "a disturbance in time whose phase dry friction hides in recordings left out": (
+        *(20261217, 137),
+        [("periodic_disturbance", "motor")],
+    ),
     "a dead time before the lag of a motor, in a loop: a late sensor stood in for it": (
         *(20261209, 148),
         [("drive_lag", "motor")],
