@@ -138,7 +138,7 @@ def completed_rivals(
     """Yield the rivals whose refits look best, their refits completed; then, if those will not do, all that were tried.
 
     What lost free runs promise is no prediction, and nothing is made thorough that is far behind there. Nor is anything
-    completed at first that will not come as far as the best has come.
+    completed at first that will not come as far as the best has come, unless it resembles that.
     What comes as near as the best that matters is completed beside it: what fits better and is not to be added leaves
     the field to that. What fits best where it was fitted may be worth nothing on recordings left out. Where it gains
     what is `asked` of it and yet will not do, it may have come to rest on the way: at last the best of those begin at

@@ -24,7 +24,7 @@ from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round, shown
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stated import contradictions, corrected
-from friction_ocp.diagnosis.straying import strays_as_far
+from friction_ocp.diagnosis.straying import DRAWS, strays_as_far
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import Key
 from friction_ocp.effects.stated_values import STATED
@@ -36,8 +36,6 @@ from friction_ocp.statistics.execution import Execution
 
 MOST_PARTS = 4
 """Parts whose stated values may be taken back."""
-FEW_DRAWS = 0.05
-"""Level at which it takes 19 draws of noise to tell that it makes free runs stray as far."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class Diagnosis:
         """
         if self._comes_closer:
             return False
-        level = max(self.level, FEW_DRAWS) if self.left_over else self.level
+        level = max(self.level, 1.0 / (DRAWS + 1)) if self.left_over else self.level
         return self.after.drowned or strays_as_far(self.final, self.after, self.problem.estimation.seed, level)
 
     @cached_property

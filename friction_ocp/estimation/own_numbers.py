@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -118,15 +119,17 @@ def _on_the_best_nodes(program: Program, starts: Sequence[Point]) -> list[Point]
 
     Dry friction leaves nodes at ends of their own, which differ by more than what short segments tell of the numbers.
     """
-    found = list(starts)
+    cost = itemgetter(0)
+    found = [(program.objective(start), start) for start in starts]
     for _ in range(MOST_PASSES):
-        best = min(found, key=program.objective)
-        before, nodes = program.objective(best), best.nodes
-        led = [item if item is best else solve_nodes(program, Point(item.theta, nodes)) for item in found]
-        found = [min(pair, key=program.objective) for pair in zip(found, led, strict=True)]
-        if before - min(map(program.objective, found)) < UNIMPORTANT:
+        before, best = min(found, key=cost)
+        led = [solve_nodes(program, Point(item.theta, best.nodes)) for _, item in found if item is not best]
+        again = [(program.objective(item), item) for item in led]
+        others = [pair for pair in found if pair[1] is not best]
+        found = [(before, best), *(min(pairs, key=cost) for pairs in zip(others, again, strict=True))]
+        if before - min(map(cost, found)) < UNIMPORTANT:
             break
-    return sorted(found, key=program.objective)
+    return [item for _, item in sorted(found, key=cost)]
 
 
 def _at_other_crests(start: FloatArray, paths: Sequence[str], numbers: Mapping[str, Any]) -> Iterator[FloatArray]:

@@ -3,9 +3,9 @@
 python problems/benchmarks/jobs.py [--case N]
 
 The case is one of the blind suite's for development: three recordings for training, two for validation, the whole
-catalogue. Two processes, as they come, share two processors; they are compared with one process on one thread, and with
-one that takes a thread for either processor by itself. The machine must have two processors to spare. The exit status
-is 1 where two processes are less than 1.6 times as fast as one on one thread, or where any number differs.
+catalogue. Every process computes with one thread; beside it stands one process with the threads that it takes by
+itself. The machine must have two processors to spare. The exit status is 1 where two processes are less than
+1.6 times as fast, or where any number differs.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Times:
     threaded: float
     """In one process with as many threads as it takes."""
     two: float
-    """In two processes, which share the processors."""
+    """In two processes with one thread each."""
     equal: bool
     """Whether all results are the same."""
 
@@ -52,7 +52,7 @@ def measure(index: int) -> Times:
         folder = Path(kept)
         problem = folder / "cases" / make(SEED, index, folder).name / "problem.yaml"
         diagnosed(problem, folder / "first", 2, {})
-        runs = {"one": (1, ALONE), "threaded": (1, {}), "two": (2, {})}
+        runs = {"one": (1, ALONE), "threaded": (1, {}), "two": (2, ALONE)}
         found = {name: diagnosed(problem, folder / name, *how) for name, how in runs.items()}
     results = [result for _, result in found.values()]
     seconds = {name: elapsed for name, (elapsed, _) in found.items()}
