@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 from friction_ocp.diagnosis.bench import Tell
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.execution.effort import effort
+from friction_ocp.execution.effort import Limit, effort
 
 LONG = 300.0
 """Seconds from which it is told beforehand how long a search may take."""
 MOST_STEPS, MOST_RUNS = 2e9, 2900.0
 """Integrator steps, as `effort` counts them, or simulations of the base model with derivatives if that is more, from
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 130,000 steps."""
+LEAST = 0.05
+"""Share of it that each way around the kinks of a fit may take, whatever is left."""
 
 
 @dataclass
@@ -30,6 +32,11 @@ class Allowance:
     def taken(self) -> float:
         """What the search has taken, over what it may take."""
         return (effort() - self.began) / self.most
+
+    @property
+    def limit(self) -> Limit:
+        """What is left of it for the ways around kinks."""
+        return Limit(max(1.0 - self.taken, 0.0) * self.most, LEAST * self.most)
 
     def exhausted(self) -> bool:
         """Whether nothing further is to be tried; whoever asks had something to try."""

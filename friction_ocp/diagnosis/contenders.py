@@ -142,7 +142,8 @@ def completed_rivals(
     What comes as near as the best that matters is completed beside it: what fits better and is not to be added leaves
     the field to that. What fits best where it was fitted may be worth nothing on recordings left out. Where it gains
     what is `asked` of it and yet will not do, it may have come to rest on the way: at last the best of those begin at
-    other sizes. The first are completed in any case, further ones as long as the search is not `exhausted`.
+    other sizes. The first FINISHED are completed in any case, and what comes near; others as long as the search is not
+    `exhausted`.
     """
     if not chosen:
         return
@@ -162,6 +163,8 @@ def completed_rivals(
     enough = max(min(refit.cost for refit in refits) - noise, 0.0) + TOLD
     hopeful = [k for k in order if k == order[0] or STAYS * (hopes[k] - noise) < enough]
     first = [k for k in order if k in hopeful[:count] or refits[k].key[0] in alike]
+    if len(first) > FINISHED and exhausted():
+        first = first[:FINISHED]
     others = [k for k in order if k not in first]
     rivals = crew.rivals([refits[k] for k in first], without, asked, thorough)
     able = [item for item in rivals if item.standing.material] or rivals

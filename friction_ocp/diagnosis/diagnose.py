@@ -21,7 +21,7 @@ from friction_ocp.diagnosis.predicted import LEAST_SHARE, led_by_predictions
 from friction_ocp.diagnosis.reading import explains_more, is_needless, leaves_less
 from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
-from friction_ocp.diagnosis.select import Round, shown
+from friction_ocp.diagnosis.select import Round
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.straying import DRAWS, strays_as_far
@@ -158,7 +158,7 @@ class Diagnosis:
     @cached_property
     def _sets(self) -> tuple[tuple[Key, ...], ...]:
         """Sets of candidates within the noise of one another; what was accepted elsewhere is there besides."""
-        sets = [[rival.key for rival in shown(item.choice.aliases)] for item in self._decided]
+        sets = [[rival.key for rival in item.choice.named] for item in self._decided]
         left = [(keys[0], *(key for key in keys[1:] if key not in self.accepted)) for keys in sets if keys]
         return tuple(keys for keys in left if len(keys) > 1)
 

@@ -6,6 +6,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.estimation.model import Model, with_step
+from friction_ocp.estimation.node_ends import worthwhile
 from friction_ocp.estimation.refinement import stepped_finely
 
 SEARCHING = 1.0
@@ -28,10 +29,12 @@ def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
 def on_steps_of(model: Model, fitted: FittedModel) -> FittedModel:
     """Fit on the integrator steps of another model, around the kinks there; the same if they are no shorter.
 
-    Of two fits on different steps the one on shorter ones costs less for that alone.
+    Of two fits on different steps the one on shorter ones costs less for that alone: where it costs more, a kink has
+    caught it.
     """
     stepped = fitted_on(fitted, model)
-    return fitted if stepped is fitted else freed(stepped)
+    caught = stepped.objective - fitted.objective > worthwhile(stepped.linear.program, stepped.objective)
+    return freed(stepped) if caught else stepped
 
 
 def fitted_on(fitted: FittedModel, model: Model) -> FittedModel:

@@ -12,6 +12,7 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.node_ends import WARM
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.rough_bowl import stepped_out, unstuck
+from friction_ocp.execution.effort import piece
 
 DETOURS = (0.02, 0.004, 0.0008, 0.00016)
 """Smoothing of the sign over the typical speed on the way around kinks, and back step by step: in one step, nodes that
@@ -26,14 +27,17 @@ def freed(fitted: FittedModel) -> FittedModel:
     """
     if not fitted.theta.size:
         return fitted
+    with piece():
+        return _moved(fitted, _freed(fitted))
+
+
+def _freed(fitted: FittedModel) -> Point:
     program, point = fitted.linear.program, fitted.linear.point
     if fitted.footing.noisy_inputs:
-        best = stepped_out(fitted.model, program, unstuck(fitted.model, program, point))
-    else:
-        beyond = around_kinks(fitted.model, program, point, WARM)
-        best = beyond.point if beyond.objective < fitted.objective else point
-        best = unstuck(fitted.model, program, best)
-    return _moved(fitted, best)
+        return stepped_out(fitted.model, program, unstuck(fitted.model, program, point))
+    beyond = around_kinks(fitted.model, program, point, WARM)
+    best = beyond.point if beyond.objective < fitted.objective else point
+    return unstuck(fitted.model, program, best)
 
 
 def _moved(fitted: FittedModel, point: Point) -> FittedModel:

@@ -3,7 +3,7 @@ found to be what the recordings cannot tell from it."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -95,13 +95,20 @@ def without_small(bench: Bench, accepted: list[Key]) -> tuple[FittedModel, list[
 
 
 def exchanged(
-    bench: Bench, rounds: Sequence[Round], accepted: list[Key], level: float, rng: np.random.Generator, run: Execution
+    bench: Bench,
+    rounds: Sequence[Round],
+    accepted: list[Key],
+    level: float,
+    rng: np.random.Generator,
+    run: Execution,
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> tuple[FittedModel, list[Round], list[Key]]:
     """Put rivals in the place of earlier additions where, beside the later ones, they explain more for certain.
 
     Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. A rival
     that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed again:
-    beside all that was missing then a small difference looked like a large one.
+    beside all that was missing then a small difference looked like a large one. Once the search is `exhausted` nothing
+    is fitted again beside what has taken another's place.
     """
     done, current, benchmark = list(rounds), bench.current, Benchmark(bench.current)
     wanted = dict[tuple[Key, Key], _Wanted]()
@@ -124,6 +131,8 @@ def exchanged(
             keys = made[rival.key] = _swapped(accepted, held.key, rival.key)
             if current is bench.current and (held.key, rival.key) in known:
                 swapped = known[held.key, rival.key]
+            elif exhausted():
+                break
             else:
                 swapped = _fitted(bench, current, keys, rival.standing.values)
             if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
@@ -281,12 +290,14 @@ def weighed_again(
     leader = again.rivals[0]
     aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]
     aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
+    twins = [rival for rival in item.choice.same if rival.key not in keys]
+    twins = twins if any(rival.key == leader.key for rival in item.choice.same) else []
     order = sorted(item.choice.rivals, key=lambda rival: (rival.key != leader.key, -known[rival.key]))
     choice = replace(
         item.choice,
         rivals=tuple(order),
         probabilities=tuple(known[rival.key] for rival in order),
         aliases=tuple(aliases),
-        same=(leader, *(rival for rival in again.rivals if rival is not leader and is_same(rival, leader))),
+        same=(leader, *(rival for rival in again.rivals if rival is not leader and is_same(rival, leader)), *twins),
     )
     return replace(item, accepted=order[0], choice=choice), None if leader is own else leader

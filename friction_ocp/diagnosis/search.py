@@ -24,7 +24,7 @@ from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
-from friction_ocp.diagnosis.select import Round, choose, shown, with_first, with_refused, withdrawn
+from friction_ocp.diagnosis.select import Round, choose, with_first, with_refused, withdrawn
 from friction_ocp.diagnosis.slow_torque import significant
 from friction_ocp.diagnosis.weighed_shapes import weighed_in_shape
 from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, required, samples, shapes, shortlist
@@ -32,6 +32,7 @@ from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.refinement import SHIFT
+from friction_ocp.execution.effort import limited
 from friction_ocp.statistics.execution import Execution
 
 MOST_ROUNDS = 4
@@ -94,7 +95,22 @@ class Search:
         return base.astray and not base.footing.predicted and (not self.accepted or self.bench.current.astray)
 
     def go(self) -> None:
-        """Add until noise is left, nothing helps or the rounds are used up."""
+        """Add until noise is left, nothing helps or the rounds are used up; then look at all of it again."""
+        with limited(self._allowance.limit):
+            self._add()
+        if self.outdone is not None:
+            return
+        unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
+        if unknown and len(set(self.accepted)) > 1:
+            current, self.accepted = without_small(self.bench, self.accepted)
+            self.bench = self.bench.at(current)
+        if self.accepted and not self._left_out.helps(self.bench, self.level):
+            self._withdraw()
+        if self.accepted:
+            self._sharpen()
+            self.bench = on_shorter_steps(self.bench, SHIFT)
+
+    def _add(self) -> None:
         for _ in range(MOST_ROUNDS):
             done = self._round(self.bench, self.accepted, self.meant)
             if not self.rounds and self._seems_missing(done) and self._better_base():
@@ -118,15 +134,6 @@ class Search:
                     break
             if self._allowance.exhausted():
                 break
-        unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
-        if unknown and len(set(self.accepted)) > 1:
-            current, self.accepted = without_small(self.bench, self.accepted)
-            self.bench = self.bench.at(current)
-        if self.accepted and not self._left_out.helps(self.bench, self.level):
-            self._withdraw()
-        if self.accepted:
-            self._sharpen()
-            self.bench = on_shorter_steps(self.bench, SHIFT)
 
     def _seems_missing(self, first: Round) -> bool:
         """Whether candidates were worth refits, or a slow torque is missing, where the base model leaves just noise."""
@@ -206,7 +213,7 @@ class Search:
         if not may_grow(self.bench.current.model.problem.drive, last.accepted.key, clues):
             found = [rival for rival in last.choice.rivals if rival.standing.cost < cost]
             nearer = [rival for rival in found if grows(rival, clues)]
-        for rival in (*shown(last.choice.aliases), *nearer):
+        for rival in (*last.choice.named, *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue
             if self._allowance.exhausted():
@@ -231,7 +238,7 @@ class Search:
         held, enough = first.accepted, required(self.bench.base, current)
         if held is None:
             return None
-        tried = {item.key for item in shown(first.choice.aliases)}
+        tried = {item.key for item in first.choice.named}
         others = [item for item in first.choice.rivals if item.key[0] != held.key[0] and item.key not in tried]
         for rival in sorted(others, key=lambda item: item.standing.cost)[:INSTEAD]:
             if self._allowance.exhausted():
@@ -297,7 +304,8 @@ class Search:
         self.bench, self._fitted_base = bench, base
 
     def _exchange(self) -> None:
-        found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)
+        spent = self._allowance.exhausted
+        found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run, spent)
         current, self.rounds, self.accepted = found
         self.bench = self.bench.at(current)
 
@@ -342,7 +350,7 @@ class Search:
         """
         first, tried = self.rounds[0], set(self.accepted)
         self.taken_back += [item for item in self.rounds if item.accepted is not None]
-        for rival in shown(first.choice.aliases):
+        for rival in first.choice.named:
             if rival.key in tried:
                 continue
             bench = self._with(rival)

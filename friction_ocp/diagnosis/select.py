@@ -45,6 +45,11 @@ class Choice:
         """The probability of each rival to be the best, by effect and component."""
         return dict(zip((rival.key for rival in self.rivals), self.probabilities, strict=True))
 
+    @property
+    def named(self) -> tuple[Rival, ...]:
+        """The members of the alias set that are worth naming (`shown`)."""
+        return shown(self.aliases, [rival.key for rival in self.same])
+
 
 NOTHING = Choice((), (), 1.0, False, ())
 """No rival takes part."""
@@ -214,18 +219,19 @@ def _blames_sensor(rival: Rival) -> bool:
     return rival.key[0].startswith("sensor_")
 
 
-def shown(aliases: Sequence[Rival]) -> tuple[Rival, ...]:
+def shown(aliases: Sequence[Rival], known: Collection[Key] = ()) -> tuple[Rival, ...]:
     """Return the members of an alias set that are worth naming.
 
     Of those that leave the same residuals as the best, only the one that says something else: another effect, and at
     another component where there is one. The others are no further explanations but the same one in other words; so is
-    the same effect elsewhere, beside a rival that differs. Nor is one that has all that another has, and more.
+    the same effect elsewhere, beside a rival that differs. Nor is one that has all that another has, and more. Some may
+    be `known` to leave the same: of those that were fitted beside other additions their residuals no longer tell.
     """
     if not aliases:
         return ()
     best = aliases[0]
     plain = [rival for rival in aliases[1:] if not any(rival.screened.holds(other.screened) for other in aliases)]
-    same = [rival for rival in plain if is_same(rival, best)]
+    same = [rival for rival in plain if rival.key in known or is_same(rival, best)]
     others = [rival for rival in plain if rival not in same]
     different = sorted(
         same, key=lambda rival: (rival.key[0] == best.key[0], _blames_sensor(rival), rival.key[1] == best.key[1])

@@ -20,15 +20,18 @@ from friction_ocp.estimation.score import simulate_recordings
 from friction_ocp.estimation.torque_noise import driving
 from friction_ocp.simulation.grid import FloatArray
 
+LOOKS = (5, 9, 19, 39, 69)
+"""Draws of the noise after which it is asked whether a further one may go as far: together at the level."""
 DRAWS = 19
-"""Draws of the noise from which it is told how far further ones may go."""
+"""Those that are enough where no verdict hangs on it."""
 
 
 def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: float, held_out: bool = True) -> bool:
     """Whether runs that noise sets apart part by as much as free runs err, of what was held out or fitted.
 
     At a level: one run in a hundred of the same kind passes the largest of 99. No more of them are simulated than that
-    takes, and few where the errors lie beyond what these tell of a further one (`_beyond`).
+    takes, and few where the errors lie beyond what these tell of a further one (`_beyond`), at a part of the level
+    after each of LOOKS.
 
     A drive whose friction falls with speed, or that is about to stick, multiplies the least difference of its start and
     of its inputs: be its model as good as it may, its free runs tell little. Nothing is linearised: measurement and
@@ -49,7 +52,7 @@ def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: flo
         drawn.append(excess_of(ratios))
         if drawn[-1] >= most:
             return True
-        if len(drawn) >= DRAWS and _beyond(most, drawn, level):
+        if len(drawn) in LOOKS and _beyond(most, drawn, level / len(LOOKS)):
             break
     return False
 

@@ -24,6 +24,7 @@ from friction_ocp.estimation.node_ends import (
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.splicing import segment_costs, spliced
+from friction_ocp.execution.effort import spent
 from friction_ocp.simulation.grid import FloatArray
 
 HARDLY = (0.0005, 0.0002)
@@ -50,6 +51,8 @@ def stepped_out(model: Model, program: Program, point: Point, watch: Watch | Non
     tenth of a standard error says nothing of the bowl. A smoothed sign does not help: what it moves is far above noise.
     """
     for _ in range(MOST_TURNS):
+        if spent():
+            break
         cost = program.objective(point)
         moved = _toward_bottom(model, program, point, cost)
         if moved is point:
@@ -113,6 +116,8 @@ def unstuck(model: Model, program: Program, point: Point, watch: Watch | None = 
     ways: list[Callable[[Program, Point], Point]] = [_fresh, *(partial(_rounded, model, width) for width in HARDLY)]
     idle, cost = 0, program.objective(point)
     for turn in range(MOST_TURNS * len(ways)):
+        if spent():
+            break
         moved = _with_better(program, point, ways[turn % len(ways)](program, point))
         enough, before = worthwhile(program, cost), cost
         if moved is not point:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from friction_ocp.diagnosis.diagnose import Diagnosis
-from friction_ocp.diagnosis.select import shown
 from friction_ocp.effects.effect import Key
 from friction_ocp.excitation.design import Design, Option, separating
 from friction_ocp.excitation.trial_run import is_driven
@@ -61,7 +60,7 @@ def follow_up(diagnosis: Diagnosis, executor: AbstractExecutor = InProcess()) ->
         return None
     wanted = set(sets[0])
     done = next(item for item in diagnosis.rounds if wanted <= {rival.key for rival in item.choice.aliases})
-    rivals = [rival for rival in shown(done.choice.aliases) if rival.key in wanted]
+    rivals = [rival for rival in done.choice.named if rival.key in wanted]
     keys = tuple(rival.key for rival in rivals)
     if not is_driven(done.before.model.problem.drive):  # a free decay, or a motion that is prescribed
         what = f"{_named(keys)} cannot be told apart here, and no command of a motor makes the motion"

@@ -34,7 +34,7 @@ class Ledger(AbstractLedger):
     """Outcomes in a folder; without one nothing is kept.
 
     A file is named after its task and the fingerprint of everything that decides its value: the shared argument, the
-    task's own, and the code of the toolkit. What was changed is therefore never found, and is done again.
+    task's own, its limit, and the code of the toolkit. What was changed is therefore never found, and is done again.
     """
 
     folder: Path | None = None
@@ -63,7 +63,8 @@ class Ledger(AbstractLedger):
     def _path(self, task: Task, shared_fingerprint: str) -> Path | None:
         if self.folder is None:
             return None
-        content = fingerprint(toolkit_fingerprint(), shared_fingerprint, task.function, task.arguments)
+        decides = (shared_fingerprint, task.function, task.arguments, task.limit)
+        content = fingerprint(toolkit_fingerprint(), *decides)
         stem = re.sub(r"[^\w.@-]+|\.{2,}", "_", task.key, flags=re.ASCII)[:80]
         return self.folder / f"{stem}-{content[:16]}.json"
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from friction_ocp.execution.effort import count
+from friction_ocp.execution.effort import count, limit
 from friction_ocp.execution.executor import AbstractExecutor
 from friction_ocp.execution.ledger import AbstractLedger, Ledger
 from friction_ocp.execution.task import Outcome, Task
@@ -47,8 +47,10 @@ def run_tasks(
     """Return the outcome of every task by its key, in the order of the tasks.
 
     An outcome is on disk before the next one is awaited. An error is an outcome; an interrupt is raised, and the next
-    run with the same ledger goes on from there. The effort of all tasks counts, also of those on disk.
+    run with the same ledger goes on from there. The effort of all tasks counts, also of those on disk;
+    what is left of a limit on it is shared out among them.
     """
+    tasks = [replace(task, limit=limit(len(tasks))) for task in tasks]
     by_key = {task.key: task for task in tasks}
     if len(by_key) != len(tasks):
         raise ValueError(f"{what}: two tasks have the same key")

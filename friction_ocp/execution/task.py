@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.execution.effort import effort, uncounted
+from friction_ocp.execution.effort import UNLIMITED, Limit, effort, limited, uncounted
 
 Json = Any
 """What a JSON file holds: None, bool, int, finite float, str, lists and dictionaries of these."""
@@ -23,6 +23,8 @@ class Task:
     """Names the task among those of one run, in progress lines and on disk."""
     function: Callable[..., Json]
     arguments: tuple[Any, ...] = ()
+    limit: Limit = UNLIMITED
+    """Of the effort that it takes where it could do with less."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Outcome:
 def attempt(task: Task, shared: Any) -> Outcome:
     """Do a task; an error is an outcome like any other, only an interrupt gets through."""
     began, before = time.perf_counter(), effort()
-    with uncounted():  # whoever asked for the task counts it
+    with uncounted(), limited(task.limit):  # whoever asked for the task counts it
         try:
             found = Outcome(task.key, task.function(shared, *task.arguments))
         except FrictionOcpError as error:

@@ -93,6 +93,15 @@ def test_the_same_effect_elsewhere_stands_back_behind_a_rival() -> None:
     assert shown((arm, motor, other)) == (arm, other)
 
 
+def test_what_left_the_same_once_is_not_named_for_what_it_leaves_now() -> None:
+    """Of two that were the same, one that was fitted again beside a later addition leaves other residuals."""
+    arm, motor = rival("constant_torque", "arm", {"a": 0.0}, gain=2.0), rival("constant_torque", "motor", {"b": 0.0})
+    other = rival("asymmetry", "motor", {"c": 0.0}, gain=4.0)
+    choice = Choice((arm, motor, other), (0.5, 0.3, 0.2), 0.0, True, (arm, other, motor), (arm,))
+    assert choice.named == (arm, other, motor)
+    assert replace(choice, same=(arm, motor)).named == (arm, other)
+
+
 def test_another_of_an_alias_set_can_be_accepted() -> None:
     """It takes the place and the probability of the first, and those that leave the same residuals stand with it."""
     one, other = rival("stribeck", "motor", {"a": 0.0}, gain=5.0), rival("cogging", "motor", {"b": 0.0}, gain=2.0)

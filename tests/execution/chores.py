@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from friction_ocp.execution.effort import count
+from friction_ocp.execution.effort import count, effort, piece, spent
 from friction_ocp.execution.processors import processors
 
 PATIENCE = 30.0
@@ -80,3 +80,12 @@ def _wait_for(happened: Callable[[], bool]) -> None:
     until = time.monotonic() + PATIENCE
     while not happened() and time.monotonic() < until:
         time.sleep(0.01)
+
+
+def patient(folder: Path, most: float) -> float:
+    """Count one by one until that is enough, or nothing is left of a limit."""
+    begun = effort()
+    with piece():
+        while not spent() and effort() - begun < most:
+            count(1.0)
+    return effort() - begun

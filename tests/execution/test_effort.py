@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from chores import counting
+from chores import counting, patient
 
-from friction_ocp.execution.effort import count, effort, once, uncounted
+from friction_ocp.execution.effort import Limit, count, effort, limited, once, piece, spent, uncounted
 from friction_ocp.execution.executor import AbstractExecutor, InProcess
 from friction_ocp.execution.ledger import Ledger
 from friction_ocp.execution.processes import Processes
@@ -37,3 +37,37 @@ def test_what_is_done_once_does_not_count() -> None:
         raise ZeroDivisionError
     count(1.0)
     assert effort() - before == 1.0
+
+
+@pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["here", "processes"])
+def test_what_is_left_of_a_limit_is_shared_out_among_tasks(tmp_path: Path, executor: AbstractExecutor) -> None:
+    """Each may take the least in any case; under another limit, a task on disk is another one."""
+    tasks, ledger = [Task("one", patient, (100.0,)), Task("other", patient, (6.0,))], Ledger(tmp_path / "tasks")
+
+    def taken() -> list[float]:
+        return [outcome.value for outcome in run_tasks("chores", tasks, tmp_path, "", executor, ledger).values()]
+
+    with limited(Limit(40.0, 3.0)):
+        count(10.0)
+        assert taken() == [15.0, 6.0]
+        assert taken() == [5.0, 5.0]
+        assert taken() == [3.0, 3.0]
+    assert taken() == [100.0, 6.0]
+
+
+def test_a_piece_of_work_ends_where_the_limit_does() -> None:
+    """Or where it has taken the least that each may; a piece of a piece no later than that."""
+    with limited(Limit(5.0, 2.0)):
+        with piece():
+            count(4.0)
+            assert not spent()
+            with piece():
+                count(1.0)
+                assert spent()
+        with piece():
+            assert not spent()
+            count(2.0)
+            assert spent()
+    with piece():
+        count(1e12)
+        assert not spent()
