@@ -290,14 +290,16 @@ def weighed_again(
     leader = again.rivals[0]
     aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]
     aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
-    twins = [rival for rival in item.choice.same if rival.key not in keys]
-    twins = twins if any(rival.key == leader.key for rival in item.choice.same) else []
+    twins = {rival.key: rival for rival in again.rivals if is_same(rival, leader)}
+    if any(rival.key == leader.key for rival in item.choice.same):
+        twins = {rival.key: rival for rival in item.choice.same} | twins
+    twins.pop(leader.key, None)
     order = sorted(item.choice.rivals, key=lambda rival: (rival.key != leader.key, -known[rival.key]))
     choice = replace(
         item.choice,
         rivals=tuple(order),
         probabilities=tuple(known[rival.key] for rival in order),
         aliases=tuple(aliases),
-        same=(leader, *(rival for rival in again.rivals if rival is not leader and is_same(rival, leader)), *twins),
+        same=(leader, *twins.values()),
     )
     return replace(item, accepted=order[0], choice=choice), None if leader is own else leader

@@ -147,12 +147,17 @@ def withdrawn(item: Round) -> Round:
 
 
 def turned(choice: Choice, rival: Rival) -> Choice:
-    """Return a choice that another rival has won, for certain: it and the first have changed places."""
+    """Return a choice that another rival has won, for certain: it and the first have changed places.
+
+    What left the same residuals as both still does.
+    """
     order = [rival, *(other for other in choice.rivals if other is not rival)]
     chances, first = choice.chances, choice.rivals[0].key
     chances[first], chances[rival.key] = chances[rival.key], chances[first]
     found = tuple(chances[item.key] for item in order)
-    return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=(rival,))
+    known = choice.same if any(other is rival for other in choice.same) else ()
+    same = (rival, *(other for other in known if other is not rival))
+    return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=same)
 
 
 def with_first(choice: Choice, rival: Rival) -> Choice:
@@ -225,7 +230,7 @@ def shown(aliases: Sequence[Rival], known: Collection[Key] = ()) -> tuple[Rival,
     Of those that leave the same residuals as the best, only the one that says something else: another effect, and at
     another component where there is one. The others are no further explanations but the same one in other words; so is
     the same effect elsewhere, beside a rival that differs. Nor is one that has all that another has, and more. Some may
-    be `known` to leave the same: of those that were fitted beside other additions their residuals no longer tell.
+    be `known` to leave the same: fitted again beside other additions, they differ by how a kink has caught them alone.
     """
     if not aliases:
         return ()

@@ -24,6 +24,10 @@ from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Free
 
+MOST = 5.0
+"""Relative change of friction at its typical loss, at most: where that warms it, no loss can take friction away
+altogether, since it goes with it."""
+
 
 class WarmUpEffect(AbstractEffect):
     """Friction drifts with time or with what it loses, or with the temperature where that is recorded.
@@ -50,13 +54,13 @@ class WarmUpEffect(AbstractEffect):
             times = [0.1 * longest, 0.3 * longest, longest]
             sizes = {f"{path}.amplitude": -0.05}
             part = WarmUp(
-                amplitude=Free(-0.1, -0.95, 5.0),
+                amplitude=Free(-0.1, -MOST, MOST),
                 time_constant=Free(times[1], 0.01 * longest, 100 * longest),
                 loss_share=Free(0.5, 0.0, 1.0),
                 power=_typical_loss(drive, place, clues),
             )
             if is_dry(shaft) and viscous_part(shaft.friction.law) is not None:
-                part = replace(part, viscous_excess=Free(0.0, -1.0, 5.0))
+                part = replace(part, viscous_excess=Free(0.0, -MOST, MOST))
                 sizes[f"{path}.viscous_excess"] = -0.05
             off = dict.fromkeys(sizes, 0.0)
             amplitudes = tuple({name: size} for name, size in sizes.items())
