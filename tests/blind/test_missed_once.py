@@ -36,6 +36,10 @@ MISSED: dict[str, tuple[int, int, Found]] = {
         *(20261217, 137),
         [("periodic_disturbance", "motor")],
     ),
+    "friction that its losses warm, and take away by as much as it had at the typical one": (
+        *(20261217, 68),
+        [("warm_up", "motor")],
+    ),
     "a dead time before the lag of a motor, in a loop: a late sensor stood in for it": (
         *(20261209, 148),
         [("drive_lag", "motor")],

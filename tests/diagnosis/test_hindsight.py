@@ -55,6 +55,14 @@ def test_what_does_not_carry_over_is_doubted_by_what_is_left_elsewhere() -> None
     assert last is rounds[1]
 
 
+def test_what_leaves_a_gap_and_does_not_carry_over_is_doubted_by_the_larger_share() -> None:
+    """By what it leaves where it was fitted, or on recordings that took no part."""
+    rounds = [decided("presliding", NOISE + 400.0, NOISE + 100.0)]
+    for lost, share in ((1.0, 1.0 - MIMICKED), (0.6, 0.6), (0.1, 0.25)):
+        (item,) = doubted(rounds, fitted(NOISE + 100.0), True, lost)
+        assert item.choice.nothing == pytest.approx(0.04 + 0.96 * share)
+
+
 def test_refits_that_explain_nothing_may_have_come_to_rest_on_the_way() -> None:
     """What nothing explains may be in the catalogue after all: by what the refits gained, if they gained anything."""
     gained = [cast(Rival, SimpleNamespace(standing=fitted(NOISE + left))) for left in (100.0, 300.0, 500.0)]
