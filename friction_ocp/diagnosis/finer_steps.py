@@ -33,6 +33,8 @@ def on_steps_of(model: Model, fitted: FittedModel) -> FittedModel:
     caught it.
     """
     stepped = fitted_on(fitted, model)
+    if stepped is fitted:
+        return fitted
     caught = stepped.objective - fitted.objective > worthwhile(stepped.linear.program, stepped.objective)
     return freed(stepped) if caught else stepped
 
