@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer, shrink
+from friction_ocp.diagnosis.free_gap import FreeErrors, comes_closer
 from friction_ocp.diagnosis.worth import ALMOST, PART, innovations, samples
 
 SHARED = 0.5
@@ -30,7 +30,7 @@ def helps(
     to go here, for certain; of what leaves no more than noise a part, unless free runs of the current model `stray` as
     far where noise alone sets them apart. Free runs that are lost say nothing, and against what takes almost all, yet
     not all, no more than that something else is missing. Where models are compared by short predictions free runs go
-    astray whatever is added: there they contradict only what makes them worse for certain.
+    astray whatever is added, and are not asked.
     """
     predicted = current.footing.predicted
     if not predicted and not innovations(current).significant(level):
@@ -40,12 +40,9 @@ def helps(
     taken, whole = base.cost - current.cost, base.cost - 0.5 * samples(base)
     if taken < PART * whole:
         return False
-    almost = 0.0 < ALMOST * whole <= taken
-    if almost and not predicted:
+    if predicted or 0.0 < ALMOST * whole <= taken:
         return True
     before, after = left_out()
-    if predicted:
-        return before.lost or shrink(before, after, current.model.problem.estimation.seed).interval95[1] >= 0.0
     if before.lost or after.drowned:
         return True
     as_much = after.excess() <= (1.0 - SHARED * taken / whole) * before.excess()

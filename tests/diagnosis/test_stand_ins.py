@@ -53,20 +53,6 @@ def test_an_addition_has_to_help_free_runs_too(
     assert stand_ins.helps(*pair, 0.01, lambda: (before, after), lambda: True) == (helps or noise)
 
 
-@pytest.mark.parametrize(("lost", "highest", "helps"), [(False, 0.2, True), (False, -0.1, False), (True, -0.1, True)])
-def test_short_predictions_are_contradicted_by_free_runs_that_get_worse(
-    monkeypatch: pytest.MonkeyPatch, lost: bool, highest: float, helps: bool
-) -> None:
-    """For certain, and not where they were lost before."""
-    model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
-    current = SimpleNamespace(cost=5.0, model=model, footing=SimpleNamespace(predicted=True))
-    monkeypatch.setattr(stand_ins, "samples", lambda fitted: 0)
-    monkeypatch.setattr(stand_ins, "shrink", lambda *args: SimpleNamespace(interval95=(-1.0, highest)))
-    runs = free_runs(100.0, lost=lost), free_runs(140.0)
-    pair = cast(Any, SimpleNamespace(cost=100.0)), cast(Any, current)
-    assert stand_ins.helps(*pair, 0.01, lambda: cast(Any, runs), lambda: False) == helps
-
-
 def rival(key: Key, cost: float, determined: int) -> Any:
     standing = SimpleNamespace(cost=cost, determined=determined, size=cost)
     return SimpleNamespace(key=key, standing=standing, fitted=SimpleNamespace(cost=cost))
