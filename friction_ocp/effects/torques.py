@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -62,9 +61,6 @@ BLUNT = 0.1
 """Damping over inertia and angular frequency of modes on a coarse grid."""
 MOST_HUNG = 0.7
 """Share of the inertia that hangs on the spring where most of it does: the resonance is then twice the zero."""
-RUNG, APART = 2, 1.1
-"""Frequencies of what is missing, strongest first, at which such a body is begun with outright; and their ratio from
-which two are not the same."""
 LIGHTEST = 0.01
 """Inertia that stays rigid over the one that is stated, at least."""
 
@@ -111,35 +107,21 @@ class StructuralModeEffect(AbstractEffect):
             off[f"{place}.inertia"] = float(shaft.inertia)
         grown = change_shaft(drive, place, inertia=host.inertia)
         added = replace(grown, shafts=(*grown.shafts, body), transmissions=(*drive.transmissions, joint))
-        ringing = clues.ringing(place, rates[0], rates[-1])
-        tried = [(rate, BLUNT) for rate in rates] + [(rate, SHARP) for rate in ringing]
+        tried = [(rate, BLUNT) for rate in rates]
+        tried += [(rate, SHARP) for rate in clues.ringing(place, rates[0], rates[-1])]
         trials = tuple(
             Trial(({f"{mode}.inertia": inertia, stiffness: inertia * rate**2, damping: ratio * inertia * rate},))
             for rate, ratio in tried
         )
-        whole = clues.numbers[f"{place}.inertia"]
-        bodies = {f"{mode}.inertia": MOST_HUNG * whole, f"{place}.inertia": (1.0 - MOST_HUNG) * whole}
+        joint_paths = (stiffness, damping)
 
         def large(small: Mapping[str, float]) -> Mapping[str, float]:
+            whole = clues.numbers[f"{place}.inertia"]
             grown = MOST_HUNG * whole / max(small[f"{mode}.inertia"], 1e-300)
-            return {**small, **bodies, **{path: grown * small[path] for path in (stiffness, damping)}}
+            hung = {f"{mode}.inertia": MOST_HUNG * whole, **{path: grown * small[path] for path in joint_paths}}
+            return {**small, **hung, f"{place}.inertia": (1.0 - MOST_HUNG) * whole}
 
-        def hung(rate: float) -> Mapping[str, float]:
-            moved = MOST_HUNG * whole
-            return {**bodies, stiffness: moved * rate**2, damping: BLUNT * moved * rate}
-
-        # what rings is the resonance of both bodies; that of the hung one, its host held, lies below
-        outright = tuple(hung(math.sqrt(1.0 - MOST_HUNG) * rate) for rate in _apart(ringing)[:RUNG])
-        return Augmentation(added, off, trials, large, outright, inside=(damping,))
-
-
-def _apart(rates: Sequence[float]) -> list[float]:
-    """Return the first of rates that are near one another, in their order."""
-    kept = list[float]()
-    for rate in rates:
-        if all(max(rate, other) > APART * min(rate, other) for other in kept):
-            kept.append(rate)
-    return kept
+        return Augmentation(added, off, trials, large, inside=(damping,))
 
 
 def _lightened(shaft: Shaft) -> Shaft:

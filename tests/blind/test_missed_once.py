@@ -40,10 +40,6 @@ MISSED: dict[str, tuple[int, int, Found]] = {
         *(20261217, 68),
         [("warm_up", "motor")],
     ),
-    "most of a load on a spring, of which a small part promises nothing where the model is far off": (
-        *(20261218, 13),
-        [("structural_mode", "load")],
-    ),
     "a dead time before the lag of a motor, in a loop: a late sensor stood in for it": (
         *(20261209, 148),
         [("drive_lag", "motor")],

@@ -13,12 +13,7 @@ from diagnosis_cases import INERTIA, write_case
 from effect_cases import hung
 
 from friction_ocp.diagnosis import refit
-from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.clues import clues_of
 from friction_ocp.diagnosis.diagnose import diagnose
-from friction_ocp.effects.registry import effects
-from friction_ocp.effects.torques import RUNG
-from friction_ocp.estimation.model import prepare
 from friction_ocp.problem_file.load import load_problem
 
 HUNG, RATE = 0.75, 2.0 * np.pi * 9.0
@@ -40,22 +35,6 @@ def test_most_of_a_stated_inertia_is_found_on_a_spring(tmp_path: Path) -> None:
     assert values["motor_mode.inertia"] == pytest.approx(HUNG * INERTIA, rel=0.02)
     assert values["motor.inertia"] == pytest.approx((1.0 - HUNG) * INERTIA, rel=0.02)
     assert values["motor-motor_mode.stiffness"] == pytest.approx(HUNG * INERTIA * RATE**2, rel=0.02)
-
-
-def test_a_body_begins_where_what_is_missing_rings(tmp_path: Path) -> None:
-    """Both bodies ring on the spring at another frequency than the hung one with its host held."""
-    fitted = fit_base(prepare(load_problem(write_case(tmp_path, hung(HUNG, RATE)))))
-    clues, drive = clues_of(fitted), fitted.model.problem.drive
-    begun = effects()["structural_mode"].addition(drive, "motor", clues).outright
-    assert 1 <= len(begun) <= RUNG
-    tones = clues.ringing("motor", 0.0, np.inf)
-    for values in begun:
-        hanging, host, stiffness = (
-            values[name] for name in ("motor_mode.inertia", "motor.inertia", "motor-motor_mode.stiffness")
-        )
-        assert hanging + host == pytest.approx(clues.numbers["motor.inertia"])
-        both = np.sqrt(stiffness * (1.0 / hanging + 1.0 / host))
-        assert min(abs(both / tone - 1.0) for tone in tones) < 1e-9
 
 
 @pytest.mark.parametrize(
