@@ -273,10 +273,14 @@ def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
 
 
 def _in_hindsight(found: Diagnosis) -> Diagnosis:
-    """Return a diagnosis whose rounds are as sure as its end lets them be."""
+    """Return a diagnosis whose rounds are as sure as its end lets them be.
+
+    Where models were compared by short predictions free runs go astray whatever is added, and cast no doubt.
+    """
     overall = found.closed.overall
     closed = min(max(overall, 0.0), 1.0) if math.isfinite(overall) else 0.0
-    doubt = 0.0 if found.carries_over or found.lost else 1.0 - closed
+    unasked = found.by_predictions or found.carries_over or found.lost
+    doubt = 0.0 if unasked else 1.0 - closed
     return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, doubt)))
 
 

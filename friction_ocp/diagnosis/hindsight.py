@@ -46,8 +46,8 @@ def doubted(rounds: Sequence[Round], final: FittedModel, left_over: bool, lost: 
     Where nothing explains what is left, an addition may be no more than what comes nearest to one unknown cause of
     both: it is doubted by as large a share as what is left has in it and the addition together. Where the additions
     come no closer to recordings that took no part, be it that more than noise is left anyway, they are doubted by the
-    share of the gap that is `lost` there: all five that left a gap and came no closer stood in for what is outside the
-    catalogue (blind suites of seeds 20261215 to 20261217).
+    share of the gap that is `lost` there: all three that left a gap and came no closer, where noise alone does
+    not keep them as far, stood in for what is outside the catalogue (blind suites of seeds 20261215 to 20261217).
 
     Where nothing was added, and more than noise is left, candidates that were refitted share what is then doubted of
     the catalogue's not having the cause, by what their refits gained.
