@@ -290,10 +290,8 @@ def weighed_again(
     leader = again.rivals[0]
     aliases = [leader, *(rival for rival in again.aliases if rival is not leader)]
     aliases += [rival for rival in item.choice.aliases if rival.key not in keys]
-    twins = {rival.key: rival for rival in again.rivals if is_same(rival, leader)}
-    if any(rival.key == leader.key for rival in item.choice.same):
-        twins = {rival.key: rival for rival in item.choice.same} | twins
-    twins.pop(leader.key, None)
+    twins = {rival.key: rival for rival in item.choice.twins(leader.key)}
+    twins |= {rival.key: rival for rival in again.rivals if rival is not leader and is_same(rival, leader)}
     order = sorted(item.choice.rivals, key=lambda rival: (rival.key != leader.key, -known[rival.key]))
     choice = replace(
         item.choice,

@@ -50,6 +50,11 @@ class Choice:
         """The members of the alias set that are worth naming (`shown`)."""
         return shown(self.aliases, [rival.key for rival in self.same])
 
+    def twins(self, key: Key) -> list[Rival]:
+        """Return the others that leave the same residuals as the best, where one of a key does."""
+        others = [rival for rival in self.same if rival.key != key]
+        return others if len(others) < len(self.same) else []
+
 
 NOTHING = Choice((), (), 1.0, False, ())
 """No rival takes part."""
@@ -155,8 +160,7 @@ def turned(choice: Choice, rival: Rival) -> Choice:
     chances, first = choice.chances, choice.rivals[0].key
     chances[first], chances[rival.key] = chances[rival.key], chances[first]
     found = tuple(chances[item.key] for item in order)
-    known = choice.same if any(other is rival for other in choice.same) else ()
-    same = (rival, *(other for other in known if other is not rival))
+    same = (rival, *choice.twins(rival.key))
     return replace(choice, rivals=tuple(order), probabilities=found, aliases=(rival,), same=same)
 
 

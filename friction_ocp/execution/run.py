@@ -50,7 +50,8 @@ def run_tasks(
     run with the same ledger goes on from there. The effort of all tasks counts, also of those on disk;
     what is left of a limit on it is shared out among them.
     """
-    tasks = [replace(task, limit=limit(len(tasks))) for task in tasks]
+    each = limit(len(tasks))
+    tasks = [replace(task, limit=each) for task in tasks]
     by_key = {task.key: task for task in tasks}
     if len(by_key) != len(tasks):
         raise ValueError(f"{what}: two tasks have the same key")
