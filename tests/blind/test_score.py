@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from blind import correlation, every_model
 from blind.arithmetic import calibration, excess, expected_error, log_score, mcnemar, share_interval, shrinkage
 from blind.cases import Case, Planted
@@ -16,7 +17,7 @@ from blind.folder import write_problem
 from blind.judging import Judged, judge, named
 from blind.picture import draw_confusion
 from blind.recording import run
-from blind.running import Failed, diagnosed, reached
+from blind.running import Failed, confirmed, diagnosed, reached
 from blind.score import NOTHING, purpose, timed_alone
 from blind.summary import Checked, Line, confusion, summary
 
@@ -234,6 +235,32 @@ def test_what_took_too_long_beside_another_is_timed_alone(tmp_path: Path, monkey
     assert timed_alone(row, tmp_path, 2) == replace(row, seconds=150.0)
     assert timed_alone(row, tmp_path, 2) == row
     assert asked[0] == (Path("cases", row.case, "problem.yaml"), Path("alone", row.case), 2)
+
+
+@pytest.mark.parametrize(
+    ("left", "found", "stands_in"),
+    [(0.98, True, True), (0.7, False, True), (1.2, True, False), (1.2, False, False)],
+)
+def test_a_rival_stands_in_where_nothing_shows_above_the_noise(
+    left: float, found: bool, stands_in: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether it had to be added for that or not; the floors of the problem stay as stated."""
+    case = Case(5, 1, "one", "servo", (Planted("unbalance", "motor", 0.3, 7, 20.0),))
+    problem = write_problem(tmp_path, case.make_machine(), truth(case.make_machine().document), {}, {})
+    asked = list[dict[str, Any]]()
+
+    def diagnosed_again(path: Path, folder: Path) -> tuple[dict[str, Any], float]:
+        asked.append(yaml.safe_load(path.read_text(encoding="utf-8")))
+        said = result("explained", *(["asymmetry"] if found else []))
+        said["gap"]["after"] = {"motor_position": {"noise_ratio": left}, "current": {"noise_ratio": 0.5}}
+        return said, 1.0
+
+    monkeypatch.setattr("blind.running.diagnosed", diagnosed_again)
+    accepted = [("unbalance", "motor"), ("cogging", "drive")]
+    rival, leader = ("asymmetry", "motor"), ("unbalance", "motor")
+    assert confirmed(case, problem, accepted, rival, leader, tmp_path / "quiet") is stands_in
+    assert asked[0]["diagnosis"] == {"effects": ["asymmetry at motor", "cogging"]}
+    assert asked[0]["channels"] == yaml.safe_load(problem.read_text(encoding="utf-8"))["channels"]
 
 
 def test_shrinkage_is_measured_on_fresh_recordings(tmp_path: Path) -> None:
