@@ -80,6 +80,12 @@ _SAME_WITHOUT_RADIAN = {
 
 EXAMPLES = "rad, deg, arcsec, turn, rpm, rad/s, m, mm, m/s, N m, uN m, N, A, mA, V, s, ms, degC, K, 1, %, counts"
 _WITHOUT_UNIT = ("1", "dimensionless")
+# Of these nobody measures a million: a misspelt mm or deg, or the degree in another language.
+_NEVER_SO_LARGE = re.compile(
+    r"(?<![^\W\d_])(?:[GM]|giga|mega)"
+    r"(?:rad|radian|deg|degree|°|arcmin|arcsec|turn|rev|m|met(?:er|re)|s|sec|second|min|minute|h|hr|hour)s?"
+    r"(?![^\W\d_])"
+)
 _COUNTS = ("count", "counts")
 
 # The radian is a dimension of its own here, so that rad/s, Hz and 1/s, or N m and N m/rad, stay apart.
@@ -150,7 +156,7 @@ def to_si(
         raise FrictionOcpError(Finding(where, f"unit '{unit}' has no scale", "counts need a stated scale", remedy))
     factor, unit_of_scale = parse_scale(scale, where)
     target = DIMENSIONS[dimension_of(unit_of_scale, where)]
-    return array * float(_convert(np.asarray(factor), unit_of_scale, target)), target
+    return _convert(array * factor, unit_of_scale, target), target
 
 
 def dimension_of(unit: str, where: str = "quantities") -> str:
@@ -198,7 +204,7 @@ def _dimension(unit: str) -> str | None:
     known = _dimensions_by_si_spelling().get(text)
     if known is not None:
         return known
-    if not text or "//" in text:
+    if not text or "//" in text or _NEVER_SO_LARGE.search(_spelling(text)):
         return None
     dimensionality = _dimensionality(text)
     return None if dimensionality is None else _dimensions_by_dimensionality().get(dimensionality)
@@ -242,10 +248,11 @@ def _root_factor(unit: str) -> float:
 
 
 def _spelling(unit: str) -> str:
-    """Return a unit in the spelling of pint: Nm is N m, % is percent, 1 is nothing."""
+    """Return a unit in the spelling of pint: Nm is N m, % is percent, Grad is the German degree, 1 is nothing."""
     text = (
         unit.strip().replace("sqrt(Hz)", "Hz^0.5").replace("%", "percent").replace("°C", "degC").replace("RPM", "rpm")
     )
+    text = re.sub(r"(?<![A-Za-z])Grad(?![A-Za-z])", "deg", text)
     text = re.sub(r"(?<![A-Za-zµμ])([kmuµμn]?)Nm(?![A-Za-z])", r"\1N m", text)
     return "" if text in _WITHOUT_UNIT else text
 

@@ -23,6 +23,12 @@ CONVERSIONS = [
     ("turn", 2.0 * np.pi, "rad"),
     ("rpm", 2.0 * np.pi / 60.0, "rad/s"),
     ("deg/s", np.pi / 180.0, "rad/s"),
+    ("Grad", np.pi / 180.0, "rad"),
+    ("Grad/s", np.pi / 180.0, "rad/s"),
+    ("Nm/Grad", 180.0 / np.pi, "N m/rad"),
+    ("MHz", 1e6, "Hz"),
+    ("GN/m", 1e9, "N/m"),
+    ("Mohm", 1e6, "ohm"),
     ("rad/s^2", 1.0, "rad/s^2"),
     ("mm", 1e-3, "m"),
     ("um", 1e-6, "m"),
@@ -62,6 +68,17 @@ def test_temperature_becomes_degrees_celsius(unit: str, value: float, expected: 
     values, found = to_si([value], unit)
     assert found == "degC"
     assert values[0] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("scale", "count", "expected"),
+    [("0.1 K", 2981, 24.95), ("0.5 degC", 43, 21.5), ("0.1 degF", 680, 20.0), ("1 K", 273.15, 0.0)],
+)
+def test_counts_of_a_temperature_are_scaled_before_the_offset(scale: str, count: float, expected: float) -> None:
+    """The offset of a temperature is added to the scaled count, not multiplied by it."""
+    values, found = to_si([count, np.nan], "counts", scale=scale)
+    assert found == "degC"
+    np.testing.assert_allclose(values, [expected, np.nan], rtol=1e-12, atol=1e-10)
 
 
 @given(st.floats(-1e9, 1e9))
@@ -105,7 +122,13 @@ def test_si_unit_follows_the_motion() -> None:
         si_unit("tork")
 
 
-@pytest.mark.parametrize("unit", ["furlong", "", "rad//s", "2 rad", "bar", "m^2", "rad +", "__import__('os')"])
+MISTAKEN = ["Mrad", "Grads", "Mm", "Mm/s", "Gdeg", "1/Ms", "mm/Ms", "megameter", "kN/Mm"]
+"""Units with a prefix that nobody means."""
+
+
+@pytest.mark.parametrize(
+    "unit", ["furlong", "", "rad//s", "2 rad", "bar", "m^2", "rad +", "__import__('os')", *MISTAKEN]
+)
 def test_unknown_unit_is_refused(unit: str) -> None:
     """What is no unit of a drive is refused, with the place and what is accepted."""
     with pytest.raises(FrictionOcpError, match=r"^a.h5: channel 'x': unknown unit '.*'; accepted: rad, deg"):
