@@ -63,7 +63,8 @@ class ImportMap:
     licence: str = ""
     delimiter: str | None = None
     """Sniffed when None; " " is any run of spaces and tabs."""
-    decimal: str = "."
+    decimal: str | None = None
+    """A point when None; once it is stated, the other one of point and comma groups thousands."""
     points: Mapping[str, Column] = field(default_factory=dict[str, Column])
     """Columns of static points, in place of channels."""
     where: str = "map"

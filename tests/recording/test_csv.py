@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from friction_ocp.errors import FrictionOcpError
-from friction_ocp.recording.csv import open_csv, sniff_layout
+from friction_ocp.recording.csv import open_csv
+from friction_ocp.recording.csv_layout import sniff_layout
 from friction_ocp.recording.hdf5 import read_recording, write_recording
 from friction_ocp.recording.import_map import Column, ImportMap, load_import_map
 from friction_ocp.recording.import_recording import import_recording, inspect_file
@@ -125,6 +126,77 @@ def test_decimal_comma_is_read_where_stated(tmp_path: Path) -> None:
     assert "line 2: '0,0' in column 'timestamp' is not a number; set decimal: ','" in faults(
         tmp_path / "b.csv", content
     )
+
+
+def written(number: float, digits: int, decimal: str, group: str = "") -> str:
+    """Return a number as a spreadsheet of some country writes it."""
+    return f"{number:,.{digits}f}".translate(str.maketrans({".": decimal, ",": group}))
+
+
+def grouped_log(delimiter: str, decimal: str, group: str, quote: str = "") -> str:
+    """Return a log of a positioning move whose thousands are grouped."""
+    seconds = np.arange(400) / 200.0
+    rows = [
+        delimiter.join(
+            f"{quote}{cell}{quote}"
+            for cell in (
+                written(t, 3, decimal, group),
+                written(3e6 * np.sin(t) - 2e5, 0, decimal, group),
+                written(2500.0 * np.cos(t), 1, decimal, group),
+            )
+        )
+        for t in seconds
+    ]
+    return "\n".join([delimiter.join(["time [s]", "position", "current [mA]"]), *rows])
+
+
+GROUPED_MAP = """
+format: friction-ocp-map/1
+time: {column: 0}
+channels:
+  position: {column: position, scale: 2*pi/1048576 rad}
+  current: {column: 2}
+"""
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "decimal", "group", "quote"),
+    [(";", ",", ".", ""), ("\t", ",", ".", ""), (";", ".", ",", ""), (",", ".", ",", '"'), (",", ",", ".", '"')],
+)
+def test_grouped_thousands_are_no_decimals(
+    tmp_path: Path, delimiter: str, decimal: str, group: str, quote: str
+) -> None:
+    """Beside a stated decimal sign the other one groups thousands; the listing says which one to state."""
+    path = put(tmp_path / "a.csv", grouped_log(delimiter, decimal, group, quote))
+    seconds = np.arange(400) / 200.0
+    stated = put(tmp_path / "m.yaml", f"{GROUPED_MAP}decimal: '{decimal}'\n")
+    read = import_recording(path, stated).channels
+    expected = np.round(3e6 * np.sin(seconds) - 2e5) * 2.0 * np.pi / 2**20
+    np.testing.assert_allclose(read["position"].values, expected, rtol=1e-12)
+    np.testing.assert_allclose(read["current"].values, 2.5 * np.cos(seconds), atol=0.5001e-4)
+    assert f"(decimal: '{decimal}' in the map)" in inspect_file(path)
+    with open_csv(path) as file:
+        assert list_signals(file, path)[2].high == 2500.0
+
+
+@pytest.mark.parametrize(
+    ("cell", "decimal", "message"),
+    [
+        ("0.125", ",", "beside decimal: ',', '.' groups thousands, as in 1.234,5; correct the cell, or decimal"),
+        ("12.5", ",", "'.' groups thousands"),
+        ("1.2345", ",", "'.' groups thousands"),
+        ("1,5", ".", "beside decimal: '.', ',' groups thousands, as in 1,234.5"),
+        ("1,234", "", "is not a number; set decimal: ',', or decimal: '.' if it groups thousands"),
+        ("1,234.5", "", "is not a number; set decimal: '.'"),
+        ("1,5", "", "is not a number; set decimal: ','"),
+        ("1.2.3", ",", "is not a number; correct or empty the cell"),
+    ],
+)
+def test_marks_that_do_not_group_thousands_are_refused(tmp_path: Path, cell: str, decimal: str, message: str) -> None:
+    """A cell that is a number with the other decimal sign alone is told by its line, never read by a guess."""
+    stated = MAP + (f"decimal: '{decimal}'\n" if decimal else "")
+    told = faults(tmp_path / "a.csv", f"timestamp;pos;cur\n0;1;2\n10;{cell};2\n", stated)
+    assert f"a.csv: line 3: '{cell}' in column 'pos'" in told and message in told
 
 
 def test_counts_are_read_with_their_scale(tmp_path: Path) -> None:

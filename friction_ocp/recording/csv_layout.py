@@ -1,0 +1,109 @@
+"""How delimited text is written: its delimiter, its header, and where its numbers begin."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording.csv_cells import MISSING, is_number
+
+_DELIMITERS = ("\t", ";", ",", " ")
+_SNIFFED_LINES = 200
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a delimited file is written."""
+
+    delimiter: str
+    """One character; " " is any run of spaces and tabs."""
+    names: tuple[str, ...]
+    first_row: int
+    """Line of the first row of numbers, from 1."""
+    encoding: str
+
+
+def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
+    """Find delimiter, header and first row of numbers; raises FrictionOcpError where there are none."""
+    if not path.is_file():
+        raise FrictionOcpError(Finding(str(path), "there is no such file", remedy="correct the path"))
+    encoding = _encoding(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as file:
+        lines = [line.rstrip("\r\n") for line in islice(file, _SNIFFED_LINES)]
+    candidates = _DELIMITERS if delimiter is None else (delimiter,)
+    splits = {candidate: [_split(line, candidate) for line in lines] for candidate in candidates}
+    counts = {candidate: _count_numbers(splits[candidate]) for candidate in candidates}
+    usual = [candidate for candidate in candidates if candidate != decimal and counts[candidate]]
+    best = max(usual or candidates, key=lambda candidate: counts[candidate])  # a decimal comma in quotes may be both
+    if counts[best] == 0:
+        allowed = "at least two columns, separated by comma, semicolon, tab or space"
+        raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
+    names, first_row = _header(splits[best])
+    return Layout(best, names, first_row + 1, encoding)
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as file:
+        head = file.read(65_536)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    try:
+        head[: head.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return line.split()
+    if len(line) > csv.field_size_limit():  # no row of a table, and more than the parser takes
+        return []
+    return [cell.strip() for row in csv.reader([line], delimiter=delimiter, skipinitialspace=True) for cell in row]
+
+
+def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return which lines are rows of the table: as wide as most lines with numbers, with the usual first number.
+
+    The usual first number (the time, mostly) tells rows from settings above them, such as "rate, 1000".
+    """
+    some = [cells for cells in rows if len(cells) > 1 and any(map(is_number, cells)) and not cells[0].startswith("#")]
+    if not some:
+        return []
+    width = Counter(map(len, some)).most_common(1)[0][0]
+    some = [cells for cells in some if len(cells) == width]
+    shares = [sum(is_number(cells[column]) for cells in some) / len(some) for column in range(width)]
+    usual = next((column for column, share in enumerate(shares) if share > 0.5), 0)
+    return [
+        index
+        for index, cells in enumerate(rows)
+        if len(cells) == width
+        and any(map(is_number, cells))
+        and (is_number(cells[usual]) or cells[usual].lower() in MISSING)
+    ]
+
+
+def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
+    return sum(is_number(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
+
+
+def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], int]:
+    """Return the names of the columns and the index of the first row of numbers.
+
+    The header is the first of the lines right above the numbers that have as many cells; a line of units may follow it.
+    """
+    first = _rows_of_numbers(rows)[0]
+    width = len(rows[first])
+    names: Sequence[str] = [""] * width
+    for cells in reversed(rows[:first]):
+        bare = [cells[0].lstrip("# "), *cells[1:]] if cells else []
+        bare = bare[1:] if len(bare) == width + 1 and not bare[0] else bare
+        if len(bare) != width or any(map(is_number, bare)):
+            break
+        names = bare
+    return tuple(name or f"column {index}" for index, name in enumerate(names)), first
