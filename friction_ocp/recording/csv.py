@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.csv_cells import no_number, numbers
+from friction_ocp.recording.csv_cells import is_missing, is_number, no_number, numbers
 from friction_ocp.recording.csv_layout import Layout, sniff_layout
 from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, no_clock
 from friction_ocp.recording.header_unit import header_unit
@@ -21,6 +21,8 @@ from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
 _ROWS_AT_ONCE = 50_000
+_TOLD = 10
+"""Faults of one file that are told."""
 _DECIMALS = {",": "decimal comma in", ".": "commas between thousands in"}
 
 
@@ -39,12 +41,15 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
         yield ForeignFile(tuple(signals), read, no_clock, summary)
         return
     check_sizes(path, signals)
-    values, hint = _whatever_is_a_number(path, layout)
+    odd = _OddRows(len(layout.names))
+    values, hint = _whatever_is_a_number(path, layout, odd)
     known = [
         replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
         for signal, column in zip(signals, values, strict=True)
     ]
-    yield ForeignFile(tuple(known), lambda wanted: {k: values[k] for k in wanted}, no_clock, summary + hint)
+    yield ForeignFile(
+        tuple(known), lambda wanted: {k: values[k] for k in wanted}, no_clock, summary + hint + odd.summary
+    )
 
 
 def _estimated_rows(path: Path) -> int:
@@ -53,12 +58,12 @@ def _estimated_rows(path: Path) -> int:
     return path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1)
 
 
-def _whatever_is_a_number(path: Path, layout: Layout) -> tuple[FloatArray, str]:
+def _whatever_is_a_number(path: Path, layout: Layout, odd: _OddRows) -> tuple[FloatArray, str]:
     """Return (columns, rows), NaN for everything else, and which decimal sign a map has to state for that."""
-    values, commas = _numbers_of_all(path, layout, None)
+    values, commas = _numbers_of_all(path, layout, None, odd)
     if not commas:
         return values, ""
-    others = {decimal: _numbers_of_all(path, layout, decimal)[0] for decimal in _DECIMALS}
+    others = {decimal: _numbers_of_all(path, layout, decimal, _OddRows(odd.width))[0] for decimal in _DECIMALS}
     decimal = max(others, key=lambda sign: np.count_nonzero(np.isfinite(others[sign])))
     before, after = (np.count_nonzero(np.isfinite(found), axis=1) for found in (values, others[decimal]))
     names = [f"'{name}'" for name, more in zip(layout.names, after > before, strict=True) if more]
@@ -66,20 +71,19 @@ def _whatever_is_a_number(path: Path, layout: Layout) -> tuple[FloatArray, str]:
     return values, f", {_DECIMALS[decimal]} {', '.join(names)} (decimal: '{decimal}' in the map)" if names else ""
 
 
-def _numbers_of_all(path: Path, layout: Layout, decimal: str | None) -> tuple[FloatArray, bool]:
+def _numbers_of_all(path: Path, layout: Layout, decimal: str | None, odd: _OddRows) -> tuple[FloatArray, bool]:
     """Return (columns, rows), and whether there are commas in what is no number."""
-    width = len(layout.names)
     chunks: list[FloatArray] = []
     commas = False
-    for _, cells in _chunks(path, layout, range(width), []):
+    for _, cells in _chunks(path, layout, range(odd.width), odd):
         values, bad = numbers(cells, decimal)
         chunks.append(values)
         commas = commas or any("," in cells[column][row] for column, row in bad)
-    return np.concatenate(chunks, axis=1) if chunks else np.empty((width, 0)), commas
+    return np.concatenate(chunks, axis=1) if chunks else np.empty((odd.width, 0)), commas
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
-    """Yield line number and cells of every row; empty lines and lines that start with # are left out."""
+    """Yield line number and cells of every row; empty lines and comments are left out."""
     with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
         lines = islice(file, layout.first_row - 1, None)
         if layout.delimiter == " ":
@@ -88,40 +92,87 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
             reader = csv.reader(lines, delimiter=layout.delimiter, skipinitialspace=True)
             numbered = ((layout.first_row - 1 + reader.line_num, cells) for cells in reader)
         for number, cells in numbered:
-            if any(cells) and not cells[0].startswith("#"):
+            if any(cells) and not _is_comment(cells, len(layout.names)):
                 yield number, cells
 
 
+def _is_comment(cells: Sequence[str], width: int) -> bool:
+    """Whether a line is a comment; a row of the table may begin with #N/A."""
+    return cells[0].startswith("#") and not (
+        len(cells) == width and (is_missing(cells[0]) or any(map(is_number, cells)))
+    )
+
+
+@dataclass
+class _OddRows:
+    """Rows that have another width than the table."""
+
+    width: int
+    count: int = 0
+    told: list[str] = field(default_factory=list[str])
+
+    def add(self, line: int, cells: int) -> None:
+        self.tell(f"line {line} has {cells} cells where {self.width} are expected")
+
+    def tell(self, what: str) -> None:
+        self.count += 1
+        if self.count <= _TOLD:
+            self.told.append(what)
+
+    @property
+    def summary(self) -> str:
+        """What `--inspect` says of them."""
+        lines = "1 line does" if self.count == 1 else f"{self.count} lines do"
+        return f", {lines} not fit into the table: {self.told[0]}" if self.count else ""
+
+
+def _whole_rows(
+    rows: Iterable[tuple[int, list[str]]], layout: Layout, odd: _OddRows
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield rows as wide as the table; where its last columns have ended, cells for them are added.
+
+    A row that is shorter than the next one, or than all before it and the last, has been cut off.
+    """
+    ended, since, last = odd.width, 0, 0
+    for number, cells in rows:
+        if len(cells) > odd.width or (len(cells) < odd.width and layout.delimiter == " "):
+            odd.add(number, len(cells))
+            continue
+        if len(cells) > ended:
+            odd.add(since, ended)
+        if len(cells) != ended:
+            ended, since = len(cells), number
+        last = number
+        yield number, cells + [""] * (odd.width - len(cells))
+    if ended < odd.width and since == last:
+        odd.add(since, ended)
+
+
 def _chunks(
-    path: Path, layout: Layout, indices: Sequence[int], findings: list[Finding]
+    path: Path, layout: Layout, indices: Sequence[int], odd: _OddRows
 ) -> Iterator[tuple[list[int], list[list[str]]]]:
-    """Yield line numbers and the cells of the wanted columns, many rows at once; rows of another width are findings."""
-    width = len(layout.names)
-    rows = _rows(path, layout)
+    """Yield line numbers and the cells of the wanted columns, many rows at once."""
+    rows = _whole_rows(_rows(path, layout), layout, odd)
     try:
         while chunk := list(islice(rows, _ROWS_AT_ONCE)):
-            for number, cells in chunk:
-                if len(cells) != width and len(findings) < 10:
-                    what = f"line {number} has {len(cells)} cells where {width} are expected"
-                    findings.append(Finding(str(path), what, remedy="complete or remove the line"))
-            whole = [(number, cells) for number, cells in chunk if len(cells) == width]
-            yield [number for number, _ in whole], [[cells[index] for _, cells in whole] for index in indices]
+            yield [number for number, _ in chunk], [[cells[index] for _, cells in chunk] for index in indices]
     except csv.Error as error:
-        findings.append(Finding(str(path), f"this is not delimited text ({error})"))
+        odd.tell(f"this is not delimited text ({error})")
 
 
 def _read_columns(path: Path, layout: Layout, decimal: str | None, indices: Sequence[int]) -> Mapping[int, FloatArray]:
     """Read the wanted columns; raises FrictionOcpError for cells that are no numbers."""
-    findings: list[Finding] = []
+    odd, findings = _OddRows(len(layout.names)), list[Finding]()
     chunks: list[FloatArray] = []
-    for lines, cells in _chunks(path, layout, indices, findings):
+    for lines, cells in _chunks(path, layout, indices, odd):
         values, bad = numbers(cells, decimal)
         chunks.append(values)
-        for column, row in bad[: max(0, 10 - len(findings))]:
+        for column, row in bad[: max(0, _TOLD - len(findings))]:
             cell = cells[column][row].strip()
             place = f"line {lines[row]}: '{cell}' in column '{layout.names[indices[column]]}'"
             findings.append(no_number(str(path), place, cell, decimal))
+    findings = [Finding(str(path), what, remedy="complete or remove the line") for what in odd.told] + findings
     if findings:
-        raise FrictionOcpError(findings)
+        raise FrictionOcpError(findings[:_TOLD])
     values = np.concatenate(chunks, axis=1)
     return {index: values[row] for row, index in enumerate(indices)}

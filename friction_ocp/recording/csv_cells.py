@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.errors import Finding
 from friction_ocp.recording.recording import FloatArray
 
-MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+_MISSING = ("", "nan", "na", "n/a", "#n/a", "#na", "#nv", "null", "none", "-")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)
 _GROUP = {".": ",", ",": "."}
 """What groups thousands beside each decimal sign."""
@@ -18,6 +18,11 @@ _GROUPED = {
     ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?"),
     ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?"),
 }
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no value."""
+    return cell.strip().lower() in _MISSING
 
 
 def is_number(cell: str) -> bool:
@@ -70,7 +75,7 @@ def _plain(cells: Sequence[str], decimal: str | None) -> FloatArray:
 
 def _number(cell: str, decimal: str | None) -> float | None:
     """Return the value of one cell, NaN where it is missing, None where it is neither."""
-    if cell.lower() in MISSING:
+    if is_missing(cell):
         return np.nan
     if decimal is not None and _GROUPED[decimal].fullmatch(cell):
         cell = cell.replace(_GROUP[decimal], "")

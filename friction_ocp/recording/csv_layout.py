@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.csv_cells import MISSING, is_number
+from friction_ocp.recording.csv_cells import is_missing, is_number
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
@@ -82,9 +82,7 @@ def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
     return [
         index
         for index, cells in enumerate(rows)
-        if len(cells) == width
-        and any(map(is_number, cells))
-        and (is_number(cells[usual]) or cells[usual].lower() in MISSING)
+        if len(cells) == width and any(map(is_number, cells)) and (is_number(cells[usual]) or is_missing(cells[usual]))
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,7 +77,10 @@ def load_import_map(path: str | Path) -> ImportMap:
     try:
         text = Path(path).read_text(encoding="utf-8")
         _refuse_monsters(text, where)
-        content: object = yaml.safe_load(text)
+        loader: Any = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        _refuse_repeated_keys(node, where)
+        content: object = None if node is None else loader.construct_document(node)
     except FileNotFoundError as error:
         raise FrictionOcpError(Finding(where, "there is no such map", remedy="correct the path")) from error
     except RecursionError as error:
@@ -100,6 +103,37 @@ def _refuse_monsters(text: str, where: str) -> None:
         raise FrictionOcpError(Finding(where, f"the map has {len(text)} characters", f"at most {MAX_CHARACTERS}"))
     if re.search(r"[\[{]\s*" * MAX_BRACKETS, text):
         raise FrictionOcpError(Finding(where, "this is nested too deeply"))
+
+
+def _refuse_repeated_keys(root: yaml.Node | None, where: str) -> None:
+    """Refuse keys that stand twice in a mapping: YAML would keep the last of them alone."""
+    findings: list[Finding] = []
+    seen: set[int] = set()
+    todo = [] if root is None else [root]
+    while todo:
+        node = todo.pop()
+        if id(node) in seen or not isinstance(node, yaml.CollectionNode):
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            findings += _repeated_keys([key for key, _ in node.value], where)
+            todo += [value for _, value in reversed(node.value)]
+        else:
+            todo += reversed(node.value)
+    if findings:
+        raise FrictionOcpError(findings)
+
+
+def _repeated_keys(keys: Sequence[yaml.Node], where: str) -> list[Finding]:
+    findings: list[Finding] = []
+    first_line: dict[str, int] = {}
+    for key in keys:
+        name, line = str(key.value), key.start_mark.line + 1
+        if name in first_line:
+            what = f"key '{name}' stands here again, first in line {first_line[name]}"
+            findings.append(Finding(f"{where}: line {line}", what, remedy="keep one of them"))
+        first_line.setdefault(name, line)
+    return findings
 
 
 @dataclass

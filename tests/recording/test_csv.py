@@ -259,6 +259,61 @@ def test_each_fault_of_a_file_is_told(tmp_path: Path, content: str, message: str
     assert message in faults(tmp_path / "a.csv", content)
 
 
+SCOPE_MAP = """
+format: friction-ocp-map/1
+channels:
+  position: {column: 1, unit: deg, time: {column: 0, unit: ms}}
+  speed: {column: 3, unit: deg/s, time: {column: 2, unit: ms}}
+"""
+
+
+def scope_rows(samples: int, delimiter: str = ";") -> list[str]:
+    """Return rows of a fast and of a slow signal with their own times, where empty cells at the end are left out."""
+    fast = [f"{k}.0{delimiter}{np.sin(k / 50):.4f}" for k in range(samples)]
+    slow = [f"{4 * k}.0{delimiter}{np.cos(k / 12.5):.3f}" for k in range(samples // 4)]
+    return [row + (f"{delimiter}{slow[k]}" if k < len(slow) else "") for k, row in enumerate(fast)]
+
+
+def test_columns_that_end_early_are_read(tmp_path: Path) -> None:
+    """A scope that leaves out the cells of columns that have ended is read whole, and listed whole."""
+    path = put(tmp_path / "a.csv", "\n".join(["t1;position;t2;speed", *scope_rows(800)]))
+    read = import_recording(path, put(tmp_path / "m.yaml", SCOPE_MAP)).channels
+    position, speed = read["position"], read["speed"]
+    assert (len(position.values), len(speed.values), speed.time[-1]) == (800, 200, 0.796)
+    np.testing.assert_allclose(position.values, np.deg2rad(np.sin(np.arange(800) / 50)), atol=1e-6)
+    told = inspect_file(path)
+    assert "not fit" not in told and "600 empty" in told
+
+
+@pytest.mark.parametrize("line", [300, 1000])
+def test_rows_that_were_cut_off_are_told(tmp_path: Path, line: int) -> None:
+    """A row that ends early in the middle of a log, or as its last, is refused, and told by the listing."""
+    rows = scope_rows(4000)[:999]
+    rows[line - 2] = rows[line - 2].rsplit(";", 2)[0]
+    content = "\n".join(["t1;position;t2;speed", *rows])
+    what = f"line {line} has 2 cells where 4 are expected"
+    assert f"a.csv: {what}; complete or remove the line" in faults(tmp_path / "a.csv", content, SCOPE_MAP)
+    assert f"1 line does not fit into the table: {what}" in inspect_file(tmp_path / "a.csv")
+
+
+def test_a_hole_between_spaces_is_no_column_that_ended(tmp_path: Path) -> None:
+    """Between spaces any cell may be the missing one: such rows are refused, and told by the listing."""
+    content = "\n".join(["t1 position t2 speed", *scope_rows(400, " ")])
+    assert "line 102 has 2 cells where 4 are expected" in faults(tmp_path / "a.txt", content, SCOPE_MAP)
+    assert "300 lines do not fit into the table: line 102" in inspect_file(tmp_path / "a.txt")
+
+
+def test_rows_that_begin_with_a_missing_value_are_no_comments(tmp_path: Path) -> None:
+    """The #N/A of a spreadsheet in the first column is a missing sample; a comment between rows is left out."""
+    rows = [f"{'#N/A' if k % 7 == 3 else k / 8},{k / 100},{k % 5}" for k in range(350)]
+    content = "\n".join(["speed [rpm],time [s],current [A]", *rows[:50], "# pause", "# torque off, again", *rows[50:]])
+    path = put(tmp_path / "a.csv", content)
+    channels = {"speed": Column(0), "current": Column(2)}
+    speed = read_csv(path, ImportMap(Column(1), channels)).channels["speed"]
+    assert (len(speed.values), np.count_nonzero(np.isnan(speed.values))) == (350, 50)
+    assert "50 empty" in inspect_file(path)
+
+
 def test_faults_are_told_together_but_not_by_the_thousand(tmp_path: Path) -> None:
     """Bad cells are told at once, ten of them at most."""
     assert len(faults(tmp_path / "a.csv", "timestamp,pos,cur\n0,1,2\n1,a,b\n2,3,4\n").splitlines()) == 2
@@ -305,6 +360,12 @@ def map_of(**changes: str) -> str:
         ({"delimiter": "'ab'"}, "delimiter: the delimiter is 'ab'; one character"),
         ({"title": "{a: 1}"}, "title: this is a mapping; text"),
         ({"title": "'open"}, "this is not YAML ("),
+        (
+            {"channels": "\n  x: {column: x, unit: A}\n  y: {column: y}\n  x: {column: z, unit: A}"},
+            "line 5: key 'x' stands here again, first in line 3; keep one of them",
+        ),
+        ({"title": "a\ntitle: b"}, "line 5: key 'title' stands here again, first in line 4"),
+        ({"channels": "{x: {column: x, unit: A, unit: mA}}"}, "line 2: key 'unit' stands here again, first in line 2"),
     ],
 )
 def test_each_fault_of_a_map_is_told(tmp_path: Path, changes: dict[str, str], message: str) -> None:
