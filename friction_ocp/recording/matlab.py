@@ -21,7 +21,10 @@ _COMPRESSED, _HEADER = 15, 128
 
 @contextmanager
 def open_matlab(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
-    """List the variables of a MATLAB file; a matrix has columns `name[0]`, `name[1]`, a struct fields `name.field`."""
+    """List the variables of a MATLAB file.
+
+    A matrix has columns `name[0]`, `name[1]`, a struct fields `name.field`, a cell or struct array elements `name{0}`.
+    """
     if is_hdf5(path):
         with open_hdf5(path) as file:
             yield file
@@ -62,6 +65,9 @@ def _columns(name: str, value: Any, depth: int) -> Iterator[tuple[str, Values]]:
     if isinstance(value, dict) and depth < MAX_DEPTH:
         for key, inner in cast(dict[str, Any], value).items():
             yield from _columns(f"{name}.{key}", inner, depth + 1)
+    elif isinstance(value, list) and depth < MAX_DEPTH:
+        for index, inner in enumerate(cast(list[Any], value)):
+            yield from _columns(f"{name}{{{index}}}", inner, depth + 1)
     elif isinstance(value, np.ndarray) and cast(Values, value).dtype == object and depth < MAX_DEPTH:
         for index, inner in np.ndenumerate(cast(Values, value)):
             yield from _columns(f"{name}{{{','.join(map(str, index))}}}", inner, depth + 1)

@@ -423,6 +423,22 @@ def test_cells_of_matlab_are_series(tmp_path: Path) -> None:
     assert "runs{0}" in shown and "runs{1}" in shown and shown.splitlines()[-1].split()[2] == "7"
 
 
+def test_struct_arrays_of_matlab_are_series(tmp_path: Path) -> None:
+    """What a scope of Simulink saves as a structure with time holds a struct for each signal."""
+    import scipy.io
+
+    signals = np.zeros((1, 2), dtype=[("values", object), ("label", object)])
+    signals[0, 0], signals[0, 1] = (angle()[:, None], "position"), (fast()[:, None] ** 2, "current")
+    scope = {"time": fast()[:, None], "signals": signals, "blockName": "bench/Scope"}
+    scipy.io.savemat(tmp_path / "run.mat", {"ScopeData": scope})
+    entry = {"column": "ScopeData.signals{1}.values", "unit": "A"}
+    channels = {"angle": {"column": "ScopeData.signals{0}.values", "unit": "deg"}, "current": entry}
+    case = ForeignCase(lambda folder: folder / "run.mat", channels, {"column": "ScopeData.time", "unit": "s"})
+    read = import_recording(tmp_path / "run.mat", case.map(tmp_path)).channels
+    np.testing.assert_allclose(read["angle"].values, np.deg2rad(angle()), rtol=ROUNDING)
+    np.testing.assert_allclose(read["current"].values, fast() ** 2, rtol=ROUNDING)
+
+
 def test_a_map_of_points_makes_static_points(tmp_path: Path) -> None:
     """Steady speeds and torques of a table become static points in SI units, which a problem file can list."""
     (tmp_path / "curve.csv").write_text("rpm,torque [mN m],runs\n60,120,3\n120,130,4\n-60,-118,3\n")
