@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.csv_cells import is_missing, is_number, no_number, numbers
+from friction_ocp.recording.csv_cells import is_missing, is_number, joined, no_number, numbers
 from friction_ocp.recording.csv_layout import Layout, sniff_layout
-from friction_ocp.recording.foreign import ForeignFile, Signal, check_sizes, no_clock
+from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, no_clock
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
@@ -75,10 +75,10 @@ def _numbers_of_all(path: Path, layout: Layout, decimal: str | None, odd: _OddRo
     """Return (columns, rows), and whether there are commas in what is no number."""
     chunks: list[FloatArray] = []
     commas = False
-    for _, cells in _chunks(path, layout, range(odd.width), odd):
-        values, bad = numbers(cells, decimal)
-        chunks.append(values)
-        commas = commas or any("," in cells[column][row] for column, row in bad)
+    for _, columns in _chunks(path, layout, range(odd.width), odd):
+        found = [numbers(cells, decimal) for cells in columns]
+        chunks.append(np.array([values for values, _ in found], dtype=np.float64))
+        commas = commas or any("," in cells[row] for cells, (_, bad) in zip(columns, found, strict=True) for row in bad)
     return np.concatenate(chunks, axis=1) if chunks else np.empty((odd.width, 0)), commas
 
 
@@ -160,19 +160,18 @@ def _chunks(
         odd.tell(f"this is not delimited text ({error})")
 
 
-def _read_columns(path: Path, layout: Layout, decimal: str | None, indices: Sequence[int]) -> Mapping[int, FloatArray]:
+def _read_columns(path: Path, layout: Layout, decimal: str | None, indices: Sequence[int]) -> Mapping[int, Values]:
     """Read the wanted columns; raises FrictionOcpError for cells that are no numbers."""
     odd, findings = _OddRows(len(layout.names)), list[Finding]()
-    chunks: list[FloatArray] = []
-    for lines, cells in _chunks(path, layout, indices, odd):
-        values, bad = numbers(cells, decimal)
-        chunks.append(values)
-        for column, row in bad[: max(0, _TOLD - len(findings))]:
-            cell = cells[column][row].strip()
-            place = f"line {lines[row]}: '{cell}' in column '{layout.names[indices[column]]}'"
-            findings.append(no_number(str(path), place, cell, decimal))
+    pieces: dict[int, list[Values]] = {index: [] for index in indices}
+    for lines, columns in _chunks(path, layout, indices, odd):
+        for index, cells in zip(indices, columns, strict=True):
+            values, bad = numbers(cells, decimal)
+            pieces[index].append(values)
+            for row in bad[: max(0, _TOLD - len(findings))]:
+                place = f"line {lines[row]}: '{cells[row].strip()}' in column '{layout.names[index]}'"
+                findings.append(no_number(str(path), place, cells[row].strip(), decimal))
     findings = [Finding(str(path), what, remedy="complete or remove the line") for what in odd.told] + findings
     if findings:
         raise FrictionOcpError(findings[:_TOLD])
-    values = np.concatenate(chunks, axis=1)
-    return {index: values[row] for row, index in enumerate(indices)}
+    return {index: joined(found) for index, found in pieces.items()}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from friction_ocp.errors import Finding
+from friction_ocp.recording.foreign import EXACT_INTEGERS, Values
 from friction_ocp.recording.recording import FloatArray
 
 _MISSING = ("", "nan", "na", "n/a", "#n/a", "#na", "#nv", "null", "none", "-")
@@ -30,24 +32,25 @@ def is_number(cell: str) -> bool:
     return any(pattern.fullmatch(cell) for pattern in (_NUMBER, *_GROUPED.values()))
 
 
-def numbers(columns: Sequence[Sequence[str]], decimal: str | None) -> tuple[FloatArray, list[tuple[int, int]]]:
-    """Return (columns, rows) numbers, NaN for empty cells, and the places of cells that are neither.
+def numbers(cells: Sequence[str], decimal: str | None) -> tuple[Values, list[int]]:
+    """Return the numbers in a column, NaN for empty cells, and the rows of cells that are neither.
 
-    Only beside a decimal sign that was stated does the other sign group thousands.
+    Integers beyond what floats hold stay integers where no cell is empty. The other sign groups thousands only beside a
+    decimal sign that was stated.
     """
-    bad: list[tuple[int, int]] = []
-    values = np.full((len(columns), len(columns[0]) if columns else 0), np.nan)
-    for index, cells in enumerate(columns):
-        try:
-            values[index] = _plain(cells, decimal)
-        except ValueError:
-            for row, cell in enumerate(cells):
-                number = _number(cell.strip(), decimal)
-                if number is None:
-                    bad.append((index, row))
-                else:
-                    values[index, row] = number
-    return values, bad
+    try:
+        return _exact(cells, _plain(cells, decimal)), []
+    except ValueError:
+        found = [_number(cell.strip(), decimal) for cell in cells]
+        bad = [row for row, number in enumerate(found) if number is None]
+        return np.array([np.nan if number is None else number for number in found]), bad
+
+
+def joined(pieces: Sequence[Values]) -> Values:
+    """Return the pieces of a column as one, whole numbers as integers where one piece holds integers."""
+    if any(piece.dtype.kind == "i" for piece in pieces) and all(map(_is_whole, pieces)):
+        return np.concatenate([piece.astype(np.int64) for piece in pieces])
+    return np.concatenate([*pieces, np.empty(0)])
 
 
 def no_number(where: str, place: str, cell: str, decimal: str | None) -> Finding:
@@ -71,6 +74,19 @@ def _plain(cells: Sequence[str], decimal: str | None) -> FloatArray:
             raise ValueError
         cells = [cell.replace(",", ".") for cell in cells]
     return np.asarray(cells, dtype=np.float64)
+
+
+def _exact(cells: Sequence[str], values: FloatArray) -> Values:
+    if np.any(np.abs(values) > EXACT_INTEGERS):
+        with suppress(ValueError, OverflowError):
+            return np.asarray(cells, dtype=np.int64)
+    return values
+
+
+def _is_whole(values: Values) -> bool:
+    if values.dtype.kind == "i":
+        return True
+    return bool(np.all((np.abs(values) <= EXACT_INTEGERS) & (values == np.rint(values))))
 
 
 def _number(cell: str, decimal: str | None) -> float | None:

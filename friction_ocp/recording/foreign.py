@@ -27,6 +27,9 @@ MAX_SAMPLES = 50_000_000
 COPIES = 4
 """How many times a signal is in memory while it is read, converted and written."""
 
+EXACT_INTEGERS = 2**53
+"""Integers up to here are floats without loss; time in ns since 1970 is beyond it, and as many ns are 104 days."""
+
 
 @dataclass(frozen=True)
 class Signal:

@@ -18,14 +18,11 @@ from friction_ocp.quantities import to_si
 from friction_ocp.recording.checks import check_recording, check_static_points
 from friction_ocp.recording.conditioning import without_low_pass
 from friction_ocp.recording.counters import looks_like_counter, unroll
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, is_real
+from friction_ocp.recording.foreign import EXACT_INTEGERS, ForeignFile, Signal, Values, check_sizes, is_real
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, FloatArray, Recording
 from friction_ocp.recording.sampling import first_of_each
 from friction_ocp.recording.static_points import StaticPoints
-
-EXACT_INTEGERS = 2**53
-"""Integers up to here are floats without loss; time in ns since 1970 is beyond it, and as many ns are 104 days."""
 
 
 @dataclass(frozen=True)

@@ -227,6 +227,20 @@ def test_many_rows_are_read_in_pieces(tmp_path: Path) -> None:
     assert np.array_equal(read_csv(path, PLAIN).channels["x"].values, -np.arange(n))
 
 
+@pytest.mark.parametrize("start", [1_709_300_000_123_456_789, 2**53 - 200 * 55_000])
+def test_nanoseconds_since_1970_keep_their_digits(tmp_path: Path, start: int) -> None:
+    """Stamps at 5 MHz, beyond what floats hold, are read as integers, be they so from the first piece on or not."""
+    n = 60_000
+    stamps = start + 200 * np.arange(n)
+    path = put(tmp_path / "a.csv", "t,x\n" + "\n".join(f"{stamp},{k % 7}" for k, stamp in enumerate(stamps)))
+    with open_csv(path, PLAIN) as file:
+        assert np.array_equal(file.read([0])[0], stamps)
+    if start > 2**53:
+        read = read_csv(path, ImportMap(Column("t", "ns"), PLAIN.channels))
+        np.testing.assert_allclose(read.channels["x"].time, 200e-9 * np.arange(n), rtol=1e-12)
+        assert read.attributes["time_origin"] == str(start)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
