@@ -35,7 +35,8 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
     stated = import_map or ImportMap(None, {})
     layout = sniff_layout(path, stated.delimiter, stated.decimal)
     rows, summary = _estimated_rows(path), f"delimiter {layout.delimiter!r}"
-    signals = [Signal(name, rows, header_unit(name)) for name in layout.names]
+    headed = zip(layout.names, layout.units, strict=True)
+    signals = [Signal(name, rows, header_unit(name) or unit) for name, unit in headed]
     if import_map is not None:
         read = partial(_read_columns, path, layout, import_map.decimal)
         yield ForeignFile(tuple(signals), read, no_clock, summary)

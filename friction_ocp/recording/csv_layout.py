@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv_cells import is_missing, is_number
+from friction_ocp.recording.header_unit import header_unit
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
@@ -23,6 +25,8 @@ class Layout:
     delimiter: str
     """One character; " " is any run of spaces and tabs."""
     names: tuple[str, ...]
+    units: tuple[str, ...]
+    """From a line of its own below the header; "" where there is none."""
     first_row: int
     """Line of the first row of numbers, from 1."""
     encoding: str
@@ -43,8 +47,8 @@ def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None =
     if counts[best] == 0:
         allowed = "at least two columns, separated by comma, semicolon, tab or space"
         raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
-    names, first_row = _header(splits[best])
-    return Layout(best, names, first_row + 1, encoding)
+    names, units, first_row = _header(splits[best])
+    return Layout(best, names, units, first_row + 1, encoding)
 
 
 def _encoding(path: Path) -> str:
@@ -90,18 +94,56 @@ def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
     return sum(is_number(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
 
 
-def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], int]:
-    """Return the names of the columns and the index of the first row of numbers.
+def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    """Return the names of the columns, the units in a line of their own, and the index of the first row of numbers.
 
-    The header is the first of the lines right above the numbers that have as many cells; a line of units may follow it.
+    The header is among the lines right above the numbers that have as many cells: the first of those with the most
+    names in them, as what stands above it may be padded to its width. A line of units may follow it.
     """
-    first = _rows_of_numbers(rows)[0]
-    width = len(rows[first])
-    names: Sequence[str] = [""] * width
+    table = _rows_of_numbers(rows)
+    first, width = table[0], len(rows[table[0]])
+    padded = all(not rows[index][-1] for index in table)
+    lines: list[list[str]] = []
     for cells in reversed(rows[:first]):
-        bare = [cells[0].lstrip("# "), *cells[1:]] if cells else []
-        bare = bare[1:] if len(bare) == width + 1 and not bare[0] else bare
-        if len(bare) != width or any(map(is_number, bare)):
+        line = _fitted(cells, width, padded)
+        if line is None or (any(map(is_number, line)) and not (_are_units(line) or (not lines and _counts_up(line)))):
             break
-        names = bare
-    return tuple(name or f"column {index}" for index, name in enumerate(names)), first
+        lines.insert(0, line)
+    titles = [line for line in lines if not _are_units(line)] or lines[:1] or [[""] * width]
+    names = max(titles, key=lambda line: sum(map(bool, line)))
+    below = lines[lines.index(names) + 1 :] if lines else []
+    units = next((line for line in below if _are_units(line)), [""] * width)
+    return tuple(name or f"column {k}" for k, name in enumerate(names)), tuple(map(_known_unit, units)), first
+
+
+def _fitted(cells: Sequence[str], width: int, padded: bool) -> list[str] | None:
+    """Return the cells of a line above the table, None where they are none of its columns.
+
+    There may be a mark of a comment before them, or a delimiter at the end of the line or of each row of the table.
+    """
+    bare = [cells[0].lstrip("# "), *cells[1:]] if cells else []
+    if len(bare) == width + 1 and not (bare[0] and bare[-1]):
+        bare = bare[1:] if not bare[0] else bare[:-1]
+    if len(bare) == width - 1 > 0 and padded:
+        bare = [*bare, ""]
+    return bare if len(bare) == width else None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether most cells of a line are units, such as s, [deg] or 1, and not all of them 1."""
+    stated = [cell for cell in cells if cell not in ("", "-")]
+    known = [unit for cell in stated if (unit := _known_unit(cell))]
+    return 2 * len(known) > len(stated) and any(unit != "1" for unit in known)
+
+
+def _known_unit(cell: str) -> str:
+    """Return the unit that a cell is, "" where it is none."""
+    bare = re.fullmatch(r"[\[(]?([^\[\]()]+)[\])]?", cell)
+    return "" if bare is None else "1" if bare[1] == "1" else header_unit(f"[{bare[1]}]")
+
+
+def _counts_up(cells: Sequence[str]) -> bool:
+    """Whether what is a number in a line counts columns: 1, 2, 3."""
+    counted = [cell for cell in cells if is_number(cell)]
+    first = counted[0]
+    return len(counted) > 1 and first.isdigit() and counted == [str(int(first) + k) for k in range(len(counted))]

@@ -87,6 +87,40 @@ def test_layout_is_found(tmp_path: Path, content: str) -> None:
     assert (channel.time.tolist(), channel.values.tolist()) == ([0.0, 1.0], [1.0, 2.0])
 
 
+NAMES, NONE = ("t", "pos", "cur"), ("", "", "")
+
+
+@pytest.mark.parametrize(
+    ("head", "end", "names", "units"),
+    [
+        ("Recorder;;\nt;pos;cur", "", NAMES, NONE),
+        ("Recorder;;\nt [s];pos (rad);cur [A]", "", ("t [s]", "pos (rad)", "cur [A]"), ("s", "rad", "A")),
+        ("Axis log;;\nDevice: axis 1;;\nt;pos;cur\nms;°;mA", "", NAMES, ("ms", "°", "mA")),
+        ("Recorder;V2;\nRate;1000;\nt;pos;cur", "", NAMES, NONE),
+        ("t;pos;cur", ";", (*NAMES, "column 3"), (*NONE, "")),
+        ("t;pos;cur\ns;rad;A", ";", (*NAMES, "column 3"), ("s", "rad", "A", "")),
+        ("t;pos;cur;", "", NAMES, NONE),
+        ("t;pos;duty\ns;rad;1", "", ("t", "pos", "duty"), ("s", "rad", "1")),
+        ("t;pos;cur\n[s];[Inkr];[mA]", "", NAMES, ("s", "", "mA")),
+        (";pos;cur\n-;Grad;rpm", "", ("column 0", "pos", "cur"), ("", "Grad", "rpm")),
+        ("s;m;A", "", ("s", "m", "A"), NONE),
+        ("t;1;2", "", ("t", "1", "2"), NONE),
+        ("rate;1000;5", "", ("column 0", "column 1", "column 2"), NONE),
+    ],
+)
+def test_the_real_header_is_found(
+    tmp_path: Path, head: str, end: str, names: tuple[str, ...], units: tuple[str, ...]
+) -> None:
+    """Padded lines above a header, a line of units below it, numbers in it and delimiters at line ends are seen."""
+    rows = [f"{k / 100};{np.sin(k / 30):.5f};{k % 9}{end}" for k in range(300)]
+    path = put(tmp_path / "a.csv", "\n".join([head, *rows]))
+    layout = sniff_layout(path)
+    assert layout.names == names
+    with open_csv(path, ImportMap(None, {})) as file:
+        assert len(file.read([1])[1]) == 300
+        assert tuple(signal.unit for signal in file.signals) == units
+
+
 @pytest.mark.parametrize(("encoding", "name"), [("utf-16", "x [°]"), ("cp1252", "x [°]")])
 def test_other_encodings_are_read(tmp_path: Path, encoding: str, name: str) -> None:
     """Headers of spreadsheet programs are read in their encoding."""
