@@ -19,7 +19,8 @@ from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.recording.conditioning import high_frequency_noise, reach_of_ends, smooth_motion
 from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.repeats import repeated
-from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, IntArray, build_grid
+from friction_ocp.recording.sampling import known_span
+from friction_ocp.simulation.grid import BoolArray, FloatArray, Grid, InputSignal, IntArray, build_grid, first_tick
 
 STILL, NOISE_OF_REST = 1e-3, 3.0
 """Share of the greatest speed, and standard deviations of its noise, up to which a prescribed speed has no sign."""
@@ -96,12 +97,15 @@ def experiment(use: RecordingUse, drive: SteppedDrive, inputs: tuple[Channel, ..
         )
     signals = [_input_signal(use, channel) for channel in inputs]
     samples = np.unique(np.concatenate([recording.channels[channel.name].time for channel in outputs]))
+    known = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
+    samples = _while_driven(
+        samples, drive, {item.name: known[item.name] for item in inputs if item.is_driving}, use.name
+    )
     laid = _model_inputs(signals, inputs, drive, _clock(recording))
     grid = build_grid(samples, laid, drive.mechanism.drive.controller, max_step)
     columns = [_on_nodes(grid, use, channel.name) for channel in outputs]
     for k, speed_of in undetermined_at_rest(drive.mechanism).items():
         columns[k] = np.where(_near_rest(grid, drive, speed_of, use), np.nan, columns[k])
-    known = {channel.name: signal for channel, signal in zip(inputs, signals, strict=True)}
     for k, moved_by in prescribed_accelerations(drive.mechanism).items():
         columns[k] = np.where(_beside_ends(grid, known[moved_by]), np.nan, columns[k])
     motions = [_smooth(grid, use, channel.name) for channel in outputs]
@@ -135,6 +139,29 @@ def with_inputs(item: Experiment, known: Sequence[str], wanted: Sequence[str], r
 def _input_signal(use: RecordingUse, channel: Channel) -> InputSignal:
     recorded = use.recording.channels[channel.name]
     return InputSignal(recorded.time - known_delay(channel), recorded.values, channel.hold == "zero")
+
+
+def _while_driven(
+    samples: FloatArray, drive: SteppedDrive, driving: Mapping[str, InputSignal], name: str
+) -> FloatArray:
+    """Return the sample times at which all that moves the machine is known; a sampled controller computes at the first.
+
+    What is held at the ends is not known there. Raises FrictionOcpError where that leaves no two samples.
+    """
+    if not driving or not samples.size:
+        return samples
+    spans = {key: known_span(item.time[np.isfinite(item.values)], item.zero_hold) for key, item in driving.items()}
+    begin, end = max(span[0] for span in spans.values()), min(span[1] for span in spans.values())
+    if begin <= samples[0] and end >= samples[-1]:
+        return samples
+    begin = first_tick(drive.mechanism.drive.controller, samples, begin)
+    kept = samples[(samples >= begin) & (samples <= end)]
+    if kept.size < 2:
+        known = ", ".join(f"'{key}' from {first:.4f} s to {last:.4f} s" for key, (first, last) in spans.items())
+        what = f"nothing is measured while it is known what moves the machine: {known}"
+        allowed = f"outputs are recorded from {samples[0]:.4f} s to {samples[-1]:.4f} s"
+        raise FrictionOcpError(Finding(name, what, allowed, "correct the time axes, or state a clock with its offset"))
+    return kept
 
 
 def _clock(recording: Recording) -> InputSignal:
@@ -188,8 +215,9 @@ def _near_rest(grid: Grid, drive: SteppedDrive, speed_of: str, use: RecordingUse
 def _on_nodes(grid: Grid, use: RecordingUse, name: str) -> FloatArray:
     channel = use.recording.channels[name]
     column = np.full(grid.time.size, np.nan)
-    at = np.clip(np.searchsorted(grid.time, channel.time - 1e-9), 0, grid.time.size - 1)
-    column[at] = channel.values
+    on_it = (channel.time >= grid.time[0] - 1e-9) & (channel.time <= grid.time[-1] + 1e-9)
+    at = np.clip(np.searchsorted(grid.time, channel.time[on_it] - 1e-9), 0, grid.time.size - 1)
+    column[at] = channel.values[on_it]
     return column
 
 

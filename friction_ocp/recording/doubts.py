@@ -12,10 +12,12 @@ from friction_ocp.recording.counters import Turnover, turnover
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, Recording
-from friction_ocp.recording.sampling import gaps, held_for
+from friction_ocp.recording.sampling import gaps, held_for, unseen_ends
 
 ACROSS_GAPS = "inputs run in a line across it (hold: zero keeps the last value), and nothing is compared there"
 """What becomes of a gap."""
+AT_ENDS = "where it is not known what moves the machine, nothing is compared"
+"""What becomes of the ends of a recording that an input does not reach."""
 AS_NEW = "the repeats count as measured"
 """What becomes of a repeated value."""
 
@@ -58,6 +60,29 @@ def gap_texts(channels: Iterable[Channel]) -> Iterator[str]:
             )
 
 
+def end_texts(channel: Channel, begin: float, end: float) -> Iterator[tuple[str, str]]:
+    """Yield what is to be said of the ends of a span, s, that the samples of a channel do not reach, and what to do."""
+    time = channel.time[np.isfinite(channel.values)]
+    for first, last in unseen_ends(time, begin, end):
+        early = last <= time[0]
+        side, key, at = ("before its first", "from", last) if early else ("after its last", "to", first)
+        text = f"no samples of '{channel.name}' from {first:.4f} s to {last:.4f} s, {side}: {last - first:.3g} s"
+        yield text, f"state `{key}: {at:.10g}` beside the file in the problem, or add the samples or align the clocks"
+
+
+def _span_beside(channel: Channel, recording: Recording) -> tuple[float, float]:
+    """Return from when to when the channels of a recording have samples whose own time overlaps that of one of them."""
+    spans = [span for item in recording.channels.values() if (span := _span(item)) is not None]
+    own = _span(channel)
+    met = [span for span in spans if own is not None and span[0] < own[1] and own[0] < span[1]]
+    return min((span[0] for span in met), default=0.0), max((span[1] for span in met), default=0.0)
+
+
+def _span(channel: Channel) -> tuple[float, float] | None:
+    time = channel.time[np.isfinite(channel.values)]
+    return (float(time[0]), float(time[-1])) if time.size else None
+
+
 def repeats(channel: Channel) -> int | None:
     """Return how many times a channel repeats every value, if it does."""
     return held_for(channel.values) if channel.values.shape == channel.time.shape else None
@@ -80,7 +105,11 @@ def doubts_of_import(recording: Recording, import_map: ImportMap) -> tuple[Findi
         remedy += ": of a counter, whole turns are lost in it"
     where = str(recording.path or recording.name)
     found = gap_texts(recording.channels.values())
-    return (*findings, *(Finding(where, text, ACROSS_GAPS, remedy, "warning") for text in found))
+    findings += [Finding(where, text, ACROSS_GAPS, remedy, "warning") for text in found]
+    for channel in recording.channels.values():
+        for text, way_out in end_texts(channel, *_span_beside(channel, recording)):
+            findings.append(Finding(where, text, f"if it is an input: {AT_ENDS}", way_out, "warning"))
+    return tuple(findings)
 
 
 def _doubts_of_channel(channel: Channel, entry: Column, where: str) -> Iterator[Finding]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,12 @@ from friction_ocp.recording.recording import FloatArray
 
 CHANCE = 0.01
 """Probability up to which what is seen is not taken for chance."""
+
+
+NEXT = 1.5
+"""Usual intervals beyond the first and the last sample up to which these still tell the value: the next one, late."""
+STEADY = 0.9
+"""Share of the intervals that are hardly longer than the median where samples come steadily, not when values change."""
 
 
 def gaps(time: FloatArray) -> tuple[tuple[float, float], ...]:
@@ -34,6 +42,27 @@ def interrupted(time: FloatArray) -> npt.NDArray[np.bool_]:
             break
         usual = shorter
     return ~usual
+
+
+def known_span(time: FloatArray, held: bool) -> tuple[float, float]:
+    """Return from when to when samples at `time`, (n,) s, tell a value: up to the next one that would have come.
+
+    Values that are `held` until they change, and come when they do, are known to the end.
+    """
+    if time.size < 2:
+        return (-inf, inf) if not time.size or not held else (float(time[0]), inf)
+    intervals = np.diff(time)
+    usual = NEXT * float(np.quantile(intervals, STEADY))
+    changing = held and usual > NEXT**2 * float(np.median(intervals))
+    return float(time[0]) - usual, inf if changing else float(time[-1]) + usual
+
+
+def unseen_ends(time: FloatArray, begin: float, end: float) -> tuple[tuple[float, float], ...]:
+    """Return what samples at `time` leave of a span at its two ends, s, where that is as long as a gap."""
+    if not time.size:
+        return ()
+    known = np.concatenate([[begin] if begin < time[0] else [], time, [end] if end > time[-1] else []])
+    return tuple(gap for gap in gaps(known) if gap[1] <= time[0] or gap[0] >= time[-1])
 
 
 def held_for(values: FloatArray) -> int | None:

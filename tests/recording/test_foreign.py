@@ -277,6 +277,25 @@ def test_an_interrupted_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "run.csv: no samples of 'angle' from 0.4950 s to 1.3000 s, 0.805 s where 0.005 s is usual; inputs" in said
 
 
+def test_a_logger_that_starts_late_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A current with stamps of its own that begins 0.5 s after the encoder is told with what to do about it."""
+    stamps = [
+        f"{t:.3f},{i}" for t, i in zip(fast()[100:].tolist(), np.repeat(current(), 4)[100:].tolist(), strict=True)
+    ]
+    rows = zip(fast().tolist(), angle().tolist(), [*stamps, *[","] * 100], strict=True)
+    (tmp_path / "run.csv").write_text("t,x,t2,i\n" + "".join(f"{t:.3f},{x},{row}\n" for t, x, row in rows))
+    channels = {
+        "angle": {"column": "x", "unit": "deg"},
+        "current": {"column": "i", "unit": "mA", "held": 4, "time": {"column": "t2", "unit": "s"}},
+    }
+    case = ForeignCase(lambda folder: folder / "run.csv", channels, {"column": "t", "unit": "s"})
+    arguments = ["--map", str(case.map(tmp_path)), "--out", str(tmp_path / "out.h5")]
+    assert main(["import", str(tmp_path / "run.csv"), *arguments]) == DONE
+    said = capsys.readouterr().err
+    assert "no samples of 'current' from 0.0000 s to 0.5000 s, before its first: 0.5 s" in said
+    assert "state `from: 0.5` beside the file" in said and "'angle'" not in said
+
+
 def test_values_of_a_slower_logger_are_told_and_thinned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A current of 50 Hz in rows of 200 Hz is told by --inspect and by the import; `held` keeps each value once."""
     rows = zip(fast().tolist(), angle().tolist(), np.repeat(current(), 4).tolist(), strict=True)

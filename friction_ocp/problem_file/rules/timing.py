@@ -1,8 +1,9 @@
-"""Rules about when channels show what: a delay longer than a recording leaves nothing to compare."""
+"""Rules about when channels show what: outputs are compared while the inputs that move the machine are known."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +12,9 @@ from friction_ocp.drive.parts import Channel
 from friction_ocp.errors import Finding
 from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Rule, quantity_text
+from friction_ocp.recording.doubts import AT_ENDS, end_texts
+from friction_ocp.recording.recording import Channel as RecordedChannel
+from friction_ocp.recording.sampling import known_span
 
 _MUCH = 0.5
 """Share of the time of a channel that a delay may move out of the recording before it is doubted."""
@@ -40,6 +44,33 @@ def delays_are_shorter_than_recordings(case: Case) -> Iterator[Finding]:
             yield Finding(where, what, "a time in s, shorter than the recordings", remedy, severity)
 
 
+def inputs_are_known_throughout(case: Case) -> Iterator[Finding]:
+    """What moves the machine is recorded from the first sample of the outputs to the last; delays are stated."""
+    for place, use in case.uses():
+        seen = [_on_one_clock(case, use, channel) for channel in case.drive.outputs]
+        times = [item.time for item in seen if item is not None and item.time.size]
+        if not times:
+            continue
+        begin, end = min(float(time[0]) for time in times), max(float(time[-1]) for time in times)
+        for channel in case.drive.inputs:
+            recorded = _on_one_clock(case, use, channel) if channel.is_driving else None
+            if recorded is None:
+                continue
+            last = known_span(recorded.time[np.isfinite(recorded.values)], channel.hold == "zero")[1]
+            for text, remedy in end_texts(recorded, begin, end if end > last else -np.inf):
+                yield Finding(case.at_recording(place, use), text, AT_ENDS, remedy, "warning")
+
+
+def _on_one_clock(case: Case, use: RecordingUse, channel: Channel) -> RecordedChannel | None:
+    """Return a channel as recorded, its stamps moved by the offset of its clock; None where they are not in order."""
+    recorded = use.recording.channels.get(channel.name)
+    if recorded is None or recorded.time.shape != recorded.values.shape or not np.all(np.diff(recorded.time) > 0):
+        return None
+    clock = case.drive.clock_of(channel)
+    offset = 0.0 if clock is None else case.numbers[f"{clock.path}.offset"]
+    return replace(recorded, time=recorded.time - offset) if np.isfinite(offset) and offset else recorded
+
+
 def _span(case: Case, use: RecordingUse, channel: Channel) -> tuple[float, float] | None:
     """Return when what a channel shows began and ended, s; for inputs, when it acts."""
     recorded = use.recording.channels.get(channel.name)
@@ -62,4 +93,4 @@ def _seconds(time: float) -> str:
     return quantity_text(float(f"{time:.3g}"), "s")
 
 
-TIMING: tuple[Rule, ...] = (delays_are_shorter_than_recordings,)
+TIMING: tuple[Rule, ...] = (delays_are_shorter_than_recordings, inputs_are_known_throughout)
