@@ -9,6 +9,7 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.quantities import to_si
 from friction_ocp.recording.counters import Turnover, turnover
+from friction_ocp.recording.excursions import excursions
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import Column, ImportMap
 from friction_ocp.recording.recording import Channel, Recording
@@ -18,6 +19,8 @@ ACROSS_GAPS = "inputs run in a line across it (hold: zero keeps the last value),
 """What becomes of a gap."""
 AT_ENDS = "where it is not known what moves the machine, nothing is compared"
 """What becomes of the ends of a recording that an input does not reach."""
+AS_TRUE = "a fit takes each for measured, and one can spoil it"
+"""What becomes of a stray sample."""
 AS_NEW = "the repeats count as measured"
 """What becomes of a repeated value."""
 
@@ -83,6 +86,19 @@ def _span(channel: Channel) -> tuple[float, float] | None:
     return (float(time[0]), float(time[-1])) if time.size else None
 
 
+def strays_text(channel: Channel) -> str | None:
+    """Return what is seen of samples that leave a channel and come back; None without any, or where it starts over."""
+    found = excursions(channel)
+    if not found.size or starts_over(channel) is not None:
+        return None
+    values = channel.values[found]
+    size, place = ("1 sample", "at") if found.size == 1 else (f"{found.size} samples", "first at")
+    first = f"{place} {channel.time[found[0]]:.4f} s with {values[0]:.6g} {channel.unit}"
+    return (
+        f"channel '{channel.name}' leaves its course for {size} and comes back, {first}: farther than any motion goes"
+    )
+
+
 def repeats(channel: Channel) -> int | None:
     """Return how many times a channel repeats every value, if it does."""
     return held_for(channel.values) if channel.values.shape == channel.time.shape else None
@@ -117,6 +133,8 @@ def _doubts_of_channel(channel: Channel, entry: Column, where: str) -> Iterator[
     if counter is not None:
         remedy = f"write `wrap: {_in_column(entry, counter.turn)}` there if it counts what does not jump"
         yield Finding(where, turnover_text(channel, counter), "", remedy, "warning")
+    if (strays := strays_text(channel)) is not None:
+        yield Finding(where, strays, AS_TRUE, "leave these values empty in the log, or make them NaN", "warning")
     if count is not None:
         remedy = f"write `held: {count}` there, which keeps the first of each, unless it is a command that is held"
         yield Finding(where, repeats_text(channel, count), AS_NEW, remedy, "warning")

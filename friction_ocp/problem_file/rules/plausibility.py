@@ -14,7 +14,16 @@ from friction_ocp.estimation.problem import RecordingUse
 from friction_ocp.problem_file.rules.case import Case, Motion, Rule, quantity_text
 from friction_ocp.quantities import si_unit
 from friction_ocp.recording.conditioning import detect_resolution, high_frequency_noise
-from friction_ocp.recording.doubts import ACROSS_GAPS, AS_NEW, gap_texts, missing, repeats, repeats_text
+from friction_ocp.recording.doubts import (
+    ACROSS_GAPS,
+    AS_NEW,
+    AS_TRUE,
+    gap_texts,
+    missing,
+    repeats,
+    repeats_text,
+    strays_text,
+)
 from friction_ocp.recording.recording import Channel as RecordedChannel
 from friction_ocp.recording.recording import FloatArray
 
@@ -186,6 +195,17 @@ def samples_are_not_repeated(case: Case) -> Iterator[Finding]:
             yield Finding(where, repeats_text(recorded, count), AS_NEW, remedy, "warning")
 
 
+def samples_stay_on_course(case: Case) -> Iterator[Finding]:
+    """No few samples are codes of errors or lost frames; a robust loss bears them, but of outputs alone."""
+    robust = case.problem.estimation.loss != "squares"
+    for where, channel, recorded in case.recorded():
+        told = None if robust and channel.role == "output" else strays_text(recorded)
+        if told is not None:
+            remedy = "make these samples NaN"
+            remedy += ", or state `loss: huber` in the section estimation" if channel.role == "output" else ""
+            yield Finding(where, told, AS_TRUE, remedy, "warning")
+
+
 PLAUSIBILITY: tuple[Rule, ...] = (
     stated_noise_is_seen,
     resolution_is_seen,
@@ -194,4 +214,5 @@ PLAUSIBILITY: tuple[Rule, ...] = (
     samples_come_often_enough,
     samples_have_no_gaps,
     samples_are_not_repeated,
+    samples_stay_on_course,
 )
