@@ -35,6 +35,8 @@ def _init(options: argparse.Namespace) -> int:
         print(f"  {name}: {channel['measures']}")
     if recorded.left_out:
         print(f"Not used: {', '.join(recorded.left_out)}")
+    for finding in recorded.unread:
+        print(f"warning: not read: {finding}", file=sys.stderr)
     print(f"Edit it, then: friction-ocp check {options.out}")
     return DONE
 

@@ -83,4 +83,5 @@ def _head(axis: Axis, recorded: Recorded) -> str:
     ]
     if recorded.left_out:
         lines.append(f"Channels of the recordings that are not used: {', '.join(recorded.left_out)}.")
+    lines += [f"Not read: {finding}" for finding in recorded.unread]
     return "\n".join(" ".join(line.split()) for line in lines)

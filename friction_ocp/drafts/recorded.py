@@ -40,6 +40,8 @@ class Recorded:
     """Channels whose meaning is not told by name and unit, or that a draft does not need."""
     sizes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """What the recordings tell about the axis of a test bench: whether it is linear, its friction and inertia."""
+    unread: tuple[Finding, ...] = ()
+    """What is wrong with files of the folder that are no recordings, or spoilt ones."""
 
 
 def recordings_of(folder: Path, axis: Axis) -> Recorded:
@@ -59,7 +61,7 @@ def recordings_of(folder: Path, axis: Axis) -> Recorded:
         channels, driven_by = _channels(units, axis, folder)
     train, validation = _split([path for path, _ in found])
     left_out = tuple(sorted({name for _, item in found for name in item.channels} - channels.keys()))
-    return Recorded(train, validation, channels, driven_by, left_out, sizes)
+    return Recorded(train, validation, channels, driven_by, left_out, sizes, tuple(spoilt))
 
 
 def _read_all(folder: Path) -> tuple[list[tuple[Path, Recording]], list[Finding]]:

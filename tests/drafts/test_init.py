@@ -7,6 +7,7 @@ import math
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -156,6 +157,18 @@ def test_a_joint_of_a_model_is_the_axis(tmp_path: Path, rotary: Path, name: str,
     arguments = ["init", str(tmp_path / name), "--joint", "shoulder", "--recordings", str(rotary)]
     assert main([*arguments, "--out", str(tmp_path / "a.yaml")]) == DONE
     assert drafted(tmp_path / "a.yaml")["drive"]["shafts"][0]["friction"]["tau_c"]["guess"] == 0.8
+
+
+def test_a_spoilt_recording_is_named(tmp_path: Path, rotary: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One that lost a unit is not passed over in silence, neither on the terminal nor in the draft."""
+    record(rotary, "spoilt", current="A", motor_position="rad")
+    with h5py.File(rotary / "spoilt.h5", "a") as file:
+        del file["channels/current"].attrs["unit"]
+    out = tmp_path / "axis.yaml"
+    assert main(["init", "servo", "--recordings", str(rotary), "--out", str(out)]) == DONE
+    assert "warning: not read: " in (said := capsys.readouterr().err) and "spoilt.h5" in said
+    head = out.read_text(encoding="utf-8").split("format:")[0]
+    assert "Not read: " in head and "spoilt.h5" in head
 
 
 def test_a_slide_is_a_linear_axis(tmp_path: Path) -> None:
