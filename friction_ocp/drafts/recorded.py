@@ -16,7 +16,14 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.hdf5 import read_either
 from friction_ocp.recording.recording import Recording
 
-_REFERENCE = re.compile(r"goal|ref|target|setpoint|desired|demand|wanted|command|cmd", re.IGNORECASE)
+_REFERENCE = re.compile(
+    r"goal|ref|target|set_?point|desired|demand|wanted|command|cmd|soll|error|schlepp|abweichung|fehler|deviation",
+    re.IGNORECASE,
+)
+"""Set points, and what is left to them: no sensor of the machine."""
+_SHORT_REFERENCE = frozenset({"set", "sp", "err"})
+"""The same as words of a name, not as parts of words: an offset, a spindle and a ferrite bear them, too."""
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _SUPPLY = re.compile(r"supply|bus|battery|dc_?link", re.IGNORECASE)
 _ENABLE = re.compile(r"enable", re.IGNORECASE)
 _MOTOR = re.compile(r"motor|rotor|input", re.IGNORECASE)
@@ -96,12 +103,12 @@ def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[
             "test_bench where the force or torque that a motion takes was measured"
         )
         raise FrictionOcpError(Finding(str(folder), what, f"a current (A), torque ({force}) or voltage (V)", remedy))
-    measured = [item for item in efforts if not _REFERENCE.search(item[0])] or efforts
+    measured = [item for item in efforts if not _is_reference(item[0])] or efforts
     order = ("current", "torque", "voltage")
     driving, driven_by = min(measured, key=lambda item: order.index(item[1]))
     channels: dict[str, dict[str, Any]] = {driving: {"measures": f"motor.{driven_by}", "role": "input"}}
     for name, unit in units.items():
-        if unit in _SIGNALS and not _REFERENCE.search(name) and _fits(unit, axis):
+        if unit in _SIGNALS and not _is_reference(name) and _fits(unit, axis):
             channels[name] = {"measures": f"{_shaft(name, unit, axis)}.{_SIGNALS[unit]}"}
         elif unit == "degC":
             channels[name] = {"measures": "temperature", "role": "input"}
@@ -116,7 +123,7 @@ def _channels(units: Mapping[str, str], axis: Axis, folder: Path) -> tuple[dict[
 def _held_channels(units: Mapping[str, str], axis: Axis, folder: Path) -> dict[str, dict[str, Any]]:
     """Return the motion, the speed before the angle, as what drives a test bench, and the effort as what it takes."""
     motions = [(name, _SIGNALS[unit]) for name, unit in units.items() if unit in ("rad/s", "m/s", "rad", "m")]
-    moved = min((item for item in motions if not _REFERENCE.search(item[0])), key=lambda item: item[1], default=None)
+    moved = min((item for item in motions if not _is_reference(item[0])), key=lambda item: item[1], default=None)
     force = "N m" if moved is None or units[moved[0]].startswith("rad") else "N"
     efforts = sorted((name for name, unit in units.items() if unit == force), key=lambda name: not _TAKEN.search(name))
     if moved is None or not efforts:
@@ -143,6 +150,11 @@ def _sizes(recording: Recording, channels: Mapping[str, Mapping[str, Any]]) -> d
         "viscous": 0.1 * level / fast,
         "load_inertia": 0.1 * level / quick,
     }
+
+
+def _is_reference(name: str) -> bool:
+    """Whether a name is that of a set point, or of the deviation from one."""
+    return bool(_REFERENCE.search(name)) or any(word.lower() in _SHORT_REFERENCE for word in _WORD.findall(name))
 
 
 def _listed(units: Mapping[str, str]) -> str:

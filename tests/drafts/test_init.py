@@ -159,6 +159,26 @@ def test_a_joint_of_a_model_is_the_axis(tmp_path: Path, rotary: Path, name: str,
     assert drafted(tmp_path / "a.yaml")["drive"]["shafts"][0]["friction"]["tau_c"]["guess"] == 0.8
 
 
+@pytest.mark.parametrize(
+    "other",
+    [
+        "soll_lage",
+        "Lagesollwert",
+        "set_angle",
+        "angleSP",
+        "position_error",
+        "posErr",
+        "schleppfehler",
+        "Regelabweichung",
+    ],
+)
+def test_set_points_and_their_errors_are_no_sensors(tmp_path: Path, other: str) -> None:
+    """A following error moves unlike the shaft, and a set point like it: neither is a second sensor of it."""
+    folder = record(tmp_path / "logs", current="A", spindle_angle="rad", offset_speed="rad/s", **{other: "rad"})
+    init("servo", folder, tmp_path / "axis.yaml")
+    assert list(drafted(tmp_path / "axis.yaml")["channels"]) == ["current", "spindle_angle", "offset_speed"]
+
+
 def test_a_spoilt_recording_is_named(tmp_path: Path, rotary: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One that lost a unit is not passed over in silence, neither on the terminal nor in the draft."""
     record(rotary, "spoilt", current="A", motor_position="rad")
