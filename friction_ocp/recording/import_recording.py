@@ -30,6 +30,8 @@ READERS: Mapping[str, Opener] = {
     ".csv": open_csv,
     ".tsv": open_csv,
     ".txt": open_csv,
+    ".log": open_csv,
+    ".asc": open_csv,
     ".parquet": open_parquet,
     ".mat": open_matlab,
     ".h5": open_hdf5,
@@ -48,6 +50,9 @@ READERS: Mapping[str, Opener] = {
     ".npz": open_numpy,
 }
 """Reader by the suffix of the file; a further format is a further line."""
+_HEAD, _UTF16 = 4096, (b"\xff\xfe", b"\xfe\xff")
+_OF_BYTES = b"\0"
+"""What is in the first bytes of every measurement file, whose sizes are numbers of fixed length, and in no text."""
 
 
 def import_recording(path: str | Path, map_path: str | Path) -> Recording:
@@ -96,7 +101,16 @@ def _opener(path: Path) -> Opener:
         what = f"no reader for '{path.suffix or path.name}'"
         allowed = f"available: {', '.join(READERS)}, or the folder of a ROS 2 bag"
         raise FrictionOcpError(Finding(str(path), what, allowed, "export the data to one of them"))
-    return opener
+    return open_csv if opener is open_mdf and _is_text(path) else opener
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a file is one of text: loggers write that with the ending `.dat`, too."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    return head.startswith(_UTF16) or (bool(head) and _OF_BYTES not in head)
 
 
 def _refuse_missing(path: Path) -> None:

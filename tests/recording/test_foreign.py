@@ -277,6 +277,19 @@ def test_an_interrupted_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "run.csv: no samples of 'angle' from 0.4950 s to 1.3000 s, 0.805 s where 0.005 s is usual; inputs" in said
 
 
+@pytest.mark.parametrize("ending", ["dat", "log", "asc"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_text_is_read_whatever_its_ending(tmp_path: Path, ending: str, encoding: str) -> None:
+    """Loggers write text with endings of measurement files."""
+    path = tmp_path / f"run.{ending}"
+    rows = zip(fast().tolist(), angle().tolist(), strict=True)
+    path.write_text("t [s];x [°]\n" + "".join(f"{t:.3f};{x}\n" for t, x in rows), encoding=encoding)
+    case = ForeignCase(lambda folder: path, {"angle": {"column": 1, "unit": "deg"}}, {"column": 0, "unit": "s"})
+    seen = import_recording(path, case.map(tmp_path)).channels["angle"]
+    np.testing.assert_allclose(seen.values, np.deg2rad(angle()), rtol=ROUNDING, atol=ROUNDING)
+    assert "x" in inspect_file(path)
+
+
 def test_a_logger_that_starts_late_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A current with stamps of its own that begins 0.5 s after the encoder is told with what to do about it."""
     stamps = [
