@@ -17,6 +17,7 @@ from friction_ocp.effects.registry import candidates, effects
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.model import prepare_fit
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.uncertainty import inverse_information
 from friction_ocp.excitation.contest import Contest, contested
 from friction_ocp.excitation.limits import Limits, limits_of, stated_limits
 from friction_ocp.excitation.motions import MOTIONS
@@ -31,6 +32,9 @@ Criterion = Literal["D", "A", "separation"]
 Key = tuple[str, str]
 """Effect and component."""
 Tell = Callable[[str, float], None]
+
+WIDE = 10.0
+"""Standard deviation of every parameter before any recording, over its size."""
 
 
 @dataclass(frozen=True)
@@ -119,16 +123,17 @@ def _nearest(name: str, known: Sequence[Key]) -> str:
 def sharpening(fitted: FittedModel, criterion: Criterion, tell: Tell = lambda what, share: None) -> Design:
     """Find the motion that sharpens the parameters of a fitted model most.
 
-    D: the largest gain in the logarithm of the determinant of the information, half of it in decades of volume of the
-    confidence ellipsoid. A: the smallest mean of squared relative standard errors. Source: Pukelsheim 2006.
+    D: the largest gain in the logarithm of the determinant of the information, half of it that of the volume of the
+    confidence ellipsoid. A: the smallest mean of squared relative standard errors. Source: Pukelsheim 2006; with a wide
+    prior, as what the recordings at hand do not tell has no volume (Chaloner & Verdinelli 1995).
     """
     limits = limits_of(fitted.model.problem, clues_of(fitted))
-    known, scale = known_information(fitted), _scale(fitted)
+    known, size = known_information(fitted), np.maximum(np.abs(fitted.theta), fitted.model.space.scale)
     options: list[Option] = []
     for run in _runs(fitted, limits, tell):
         both = known + information(fitted, run.recording)
-        worth = _volume(both, scale) - _volume(known, scale) if criterion == "D" else -_mean_square(both, scale)
-        options.append(Option(run, worth, std_errors=_std_errors(both)))
+        gained = _volume(both, size) - _volume(known, size) if criterion == "D" else -_mean_square(both, size)
+        options.append(Option(run, gained, std_errors=_std_errors(both)))
     options.sort(key=lambda option: -option.worth)
     return Design(fitted.model.problem, fitted, criterion, limits, tuple(options), _std_errors(known))
 
@@ -161,21 +166,21 @@ def _runs(fitted: FittedModel, limits: Limits, tell: Tell) -> list[TrialRun]:
     return found
 
 
-def _scale(fitted: FittedModel) -> FloatArray:
-    return np.maximum(np.abs(fitted.theta), 1e-12)
+def _relative(matrix: FloatArray, size: FloatArray) -> FloatArray:
+    """Return the information on parameters over their sizes, with that of the wide prior."""
+    return matrix * np.outer(size, size) + np.eye(size.size) / WIDE**2
 
 
-def _volume(matrix: FloatArray, scale: FloatArray) -> float:
-    """Return the logarithm of the determinant over directions that anything is known of."""
-    scaled = matrix * np.outer(scale, scale)
-    return float(np.sum(np.log(np.maximum(np.linalg.eigvalsh(scaled), 1e-12))))
+def _volume(matrix: FloatArray, size: FloatArray) -> float:
+    """Return the logarithm of the determinant of the information."""
+    return float(np.linalg.slogdet(_relative(matrix, size))[1])
 
 
-def _mean_square(matrix: FloatArray, scale: FloatArray) -> float:
-    return float(np.mean((_std_errors(matrix) / scale) ** 2))
+def _mean_square(matrix: FloatArray, size: FloatArray) -> float:
+    """Return the mean of squared standard errors over sizes."""
+    return float(np.mean(_std_errors(_relative(matrix, size)) ** 2))
 
 
 def _std_errors(matrix: FloatArray) -> FloatArray:
-    """Return (parameters,) standard errors; scaled first, as stiffness and friction are many decades apart."""
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-14)), 0.0)) / size
+    """Return (parameters,) standard errors, huge for what nothing is known of."""
+    return np.sqrt(np.diag(np.add(*inverse_information(matrix))))

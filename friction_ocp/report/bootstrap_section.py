@@ -5,31 +5,43 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from friction_ocp.plots.numbers import is_number, significant, to_resolution, unit_text
-from friction_ocp.plots.reading import Json, objects, rows
+from friction_ocp.plots.reading import Json, objects, part, rows
 from friction_ocp.report.section import StatisticSection, StatisticTable, columns, interval_text
 
 _WAYS = {
-    "refit": "and the simulation with these residuals is fitted again from the optimum.",
+    "refit": "and what the model says with these residuals is fitted again from the optimum.",
     "one_step": "and the optimum moves by the Gauss-Newton step of the resampled scores, within the bounds.",
 }
+_POINTS = "the error of every static point"
 
 
 def bootstrap_section(found: Json, result: Json) -> StatisticSection:
     """Give the scatter of the draws beside the standard errors of the fit."""
     blocks: Sequence[Json] = rows(found, "blocks")
-    lengths = [float(block["length_s"]) for block in blocks]
-    note = (
-        f"Blocks of {significant(min(lengths), 2)} to {significant(max(lengths), 2)} s of residuals, as long as their "
-        f"autocorrelation asks for, get random signs, {_WAYS[str(found['method'])]}"
-    )
+    points = objects(part(result, "fit"), "static").values()
+    with_points = any(item["split"] == "train" for item in points)
     return StatisticSection(
         kind="Bootstrap",
         title="Bootstrap",
         sentence=_sentence(found),
-        notes=(note,),
+        notes=(_note(found, blocks, with_points),),
         picture="Bootstrap draws of every parameter",
-        tables=(_draws_table(objects(found, "parameters"), objects(result, "parameters")), _blocks_table(blocks)),
+        tables=(
+            _draws_table(objects(found, "parameters"), objects(result, "parameters")),
+            *([_blocks_table(blocks)] if blocks else []),
+        ),
     )
+
+
+def _note(found: Json, blocks: Sequence[Json], with_points: bool) -> str:
+    """Say what got random signs, and what became of it."""
+    said = [_POINTS] if with_points else []
+    if blocks:
+        lengths = [float(block["length_s"]) for block in blocks]
+        shortest, longest = significant(min(lengths), 2), significant(max(lengths), 2)
+        said = [f"blocks of {shortest} to {longest} s of residuals, as long as their autocorrelation asks for", *said]
+    what, verb = ", and ".join(said), ", get" if blocks else " gets"
+    return f"{what[:1].upper()}{what[1:]}{verb} a random sign, {_WAYS[str(found['method'])]}"
 
 
 def _sentence(found: Json) -> str:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from friction_ocp.plots.numbers import percent, significant, unit_text
 from friction_ocp.plots.reading import Json, objects, part, rows
 
+UNTOLD = 1e3
+"""Fall of a standard error from which a parameter was not known before."""
+
 
 def design_sentence(result: Json) -> str:
     """Return the answer in one sentence."""
@@ -36,6 +39,11 @@ def _sharpest(result: Json, best: Json) -> str:
     if not gains:
         return "nothing is to be sharpened"
     name = max(gains, key=lambda one: gains[one])
+    if gains[name] > UNTOLD:
+        unit = unit_text(str(part(part(result, "parameters"), name).get("unit", "")))
+        return f"{name}, of which the recordings at hand tell nothing, gets a standard error of " + (
+            f"{significant(float(after[name]), 2)} {unit}".rstrip()
+        )
     return f"the standard error of {name} falls by a factor of {significant(gains[name], 2)}"
 
 

@@ -16,6 +16,7 @@ from friction_ocp.estimation.influence import Influence, influence
 from friction_ocp.estimation.problem import Problem
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.quadratic import bounded_step
+from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.task import Json, Task
 from friction_ocp.simulation.grid import FloatArray
@@ -30,6 +31,7 @@ FEWEST_DRAWS = 20
 FEWEST_BLOCKS = 24
 """Of all recordings: the signs of fewer have too few combinations. What is wanted beyond is told."""
 PERCENTILES = (2.5, 50.0, 97.5)
+SIGNS = (-1.0, 1.0)
 
 Method = Literal["refit", "one_step"]
 
@@ -75,7 +77,8 @@ def bootstrap(problem: Problem, draws: int = DEFAULT_DRAWS, execution: Execution
     Blocks of neighbouring residuals, of all channels at once, keep their place and get a random sign: the blockwise
     wild bootstrap (Liu 1988; Shao 2010 for dependent data). It keeps correlation within blocks and noise that changes
     along the recording, holds under misfit as the sandwich does, and for the absolute loss, where signs are the valid
-    multipliers (Feng, He & Hu 2011). A prior is drawn again about the estimate.
+    multipliers (Feng, He & Hu 2011). Every static point has a sign of its own. A prior is drawn again about the
+    estimate.
 
     Free runs are refitted from the optimum (`refit`). Relaxed segments, where gaps are noise too, get the Gauss-Newton
     step of the resampled scores within the bounds (`one_step`; Kline & Santos 2012): they are nearly linear there.
@@ -103,7 +106,7 @@ def bootstrap(problem: Problem, draws: int = DEFAULT_DRAWS, execution: Execution
 def residual_blocks(workshop: Workshop) -> tuple[Blocks, ...]:
     """Return the blocks of every recording: as long as its most correlated channel asks for, if enough are left."""
     program, point = workshop.fitted.program, workshop.fitted.solution.point
-    fewest = int(np.ceil(FEWEST_BLOCKS / len(program.experiments)))
+    fewest = int(np.ceil(FEWEST_BLOCKS / max(len(program.experiments), 1)))
     blocks: list[Blocks] = []
     for index, item in enumerate(program.experiments):
         errors = program.residuals(index, program.simulate(index, point).y)
@@ -124,7 +127,7 @@ def _seconds(item: Experiment, errors: FloatArray) -> float:
 def signs(time: FloatArray, length: float, rng: np.random.Generator) -> FloatArray:
     """Return (n,) signs that change only from block to block; the first block begins at a random phase."""
     block = np.floor((time - time[0]) / length + rng.uniform()).astype(np.int64)
-    return rng.choice([-1.0, 1.0], int(block[-1]) + 1)[block]
+    return rng.choice(SIGNS, int(block[-1]) + 1)[block]
 
 
 def refit(workshop: Workshop, number: int, lengths: Sequence[float]) -> Json:
@@ -137,18 +140,24 @@ def refit(workshop: Workshop, number: int, lengths: Sequence[float]) -> Json:
 
 
 def resampled(program: Program, best: Point, lengths: Sequence[float], rng: np.random.Generator) -> Program:
-    """Return the program with samples simulation + sign x residual, and priors drawn about the estimate."""
+    """Return the program with samples and points model + sign x residual, and priors drawn about the estimate."""
     experiments: list[Experiment] = []
     for index, (item, length) in enumerate(zip(program.experiments, lengths, strict=True)):
         simulated = program.simulate(index, best).y
         error = simulated - item.measured
         experiments.append(replace(item, measured=simulated - signs(item.grid.time, length, rng)[:, None] * error))
     space = program.space
+    static: list[StaticTerm] = []
+    for term in program.static:
+        predicted = term.predict(space, best.theta)
+        flipped = rng.choice(SIGNS, predicted.size) * (predicted - term.measured)
+        static.append(replace(term, measured=predicted - flipped))
     about = best.theta + np.where(np.isfinite(space.prior_std), space.prior_std, 0.0) * rng.standard_normal(
         best.theta.size
     )
     mean = np.where(np.isfinite(space.prior_std), about, space.prior_mean)
-    return replace(program, experiments=tuple(experiments), space=replace(space, prior_mean=mean))
+    drawn = replace(space, prior_mean=mean)
+    return replace(program, experiments=tuple(experiments), static=tuple(static), space=drawn)
 
 
 def one_steps(found: Answer, lengths: Sequence[float], draws: int) -> list[FloatArray]:
@@ -164,7 +173,7 @@ def one_steps(found: Answer, lengths: Sequence[float], draws: int) -> list[Float
     moved: list[FloatArray] = []
     for number in range(draws):
         rng = np.random.default_rng([model.problem.estimation.seed, number])
-        gradient = _resampled_score(seen, lengths, rng) + pull * rng.standard_normal(theta.size)
+        gradient = resampled_score(seen, lengths, rng) + pull * rng.standard_normal(theta.size)
         step = bounded_step(
             information,
             gradient,
@@ -177,13 +186,15 @@ def one_steps(found: Answer, lengths: Sequence[float], draws: int) -> list[Float
     return moved
 
 
-def _resampled_score(seen: Influence, lengths: Sequence[float], rng: np.random.Generator) -> FloatArray:
+def resampled_score(seen: Influence, lengths: Sequence[float], rng: np.random.Generator) -> FloatArray:
+    """Return (parameters,) the score of residuals with random signs, block by block and point by point."""
     total = np.zeros(seen.jacobian.shape[1])
     for index, length in enumerate(lengths):
         own = seen.recording == index
         weight = signs(seen.time[own], length, rng) * seen.score_weight[own]
         total += seen.jacobian[own].T @ weight
-    return total
+    points = seen.recording >= len(lengths)
+    return total + seen.jacobian[points].T @ (rng.choice(SIGNS, int(points.sum())) * seen.score_weight[points])
 
 
 def _warnings(blocks: Sequence[Blocks], draws: int, kept: int) -> tuple[str, ...]:

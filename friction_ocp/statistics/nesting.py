@@ -12,7 +12,7 @@ import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.estimation.model import Model
-from friction_ocp.parameters import Free, Tie
+from friction_ocp.parameters import Free, Tie, is_off
 from friction_ocp.statistics.answer import Answer
 from friction_ocp.statistics.misfit import mean_weight
 
@@ -54,16 +54,17 @@ def likelihood_ratios(
 def is_nested(special: Model, general: Model) -> bool:
     """Whether a model is recognised as a special case of another.
 
-    Its fitted parameters are among those of the other, its states are the same, and the other fixes or ties nothing
-    to anything else. So it is a special case as far as the laws of the same names are, which holds for coulomb,
-    viscous, coulomb_viscous within stribeck and quadratic.
+    Its fitted parameters are among those of the other, its states are the same, the other fixes or ties nothing to
+    anything else, and what the other does not have at all is off. So it is a special case as far as the laws of the
+    same names are, which holds for coulomb, viscous, coulomb_viscous within stribeck and quadratic.
     """
     few, many = set(special.space.names), set(general.space.names)
     if not few < many or special.drive.state_names != general.drive.state_names:
         return False
     own = {leaf.path: leaf.value for leaf in drive_leaves(special.problem.drive)}
     other = {leaf.path: leaf.value for leaf in drive_leaves(general.problem.drive)}
-    return all(own[path] == value for path, value in other.items() if path in own and _is_known(value))
+    same = all(own[path] == value for path, value in other.items() if path in own and _is_known(value))
+    return same and all(is_off(value) for path, value in own.items() if path not in other)
 
 
 def _is_known(value: Any) -> bool:

@@ -14,15 +14,16 @@ from plant import Trajectory
 from servo_problem import REPOSITORY
 
 from friction_ocp.cli import WRONG_INPUT, main
+from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.footing import footing
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.drive.values import bind_drive
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.first_nodes import suggested_point
-from friction_ocp.estimation.model import prepare
+from friction_ocp.estimation.model import prepare, prepare_fit
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.problem import RecordingUse
-from friction_ocp.excitation.design import Design, design
+from friction_ocp.excitation.design import Design, design, sharpening
 from friction_ocp.excitation.worth import evidence
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import read_recording
@@ -81,6 +82,25 @@ def test_the_plant_confirms_the_expected_standard_errors(sharper: Design) -> Non
 
 
 UNITS = {"position": "rad", "current": "A"}
+
+
+def test_what_the_recordings_do_not_tell_is_not_called_known(path: Path, tmp_path: Path) -> None:
+    """An offset of the current and a constant torque are the same to every recording, and further ones lose nothing."""
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"]["shafts"][0]["external_torque"] = {"constant": {"guess": 0.0, "min": -1.0, "max": 1.0}}
+    document["channels"]["current"]["offset"] = {"guess": 0.0, "min": -1.0, "max": 1.0}
+    document["recordings"] = {"train": [str(path.parent / name) for name in document["recordings"]["train"]]}
+    (tmp_path / "problem.yaml").write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    found = sharpening(fit_base(prepare_fit(load_problem(tmp_path / "problem.yaml"))), "D")
+    traded = [name.endswith(("constant", "offset")) for name in found.fitted.model.space.names]
+    assert sum(traded) == 2
+    told, size = np.logical_not(traded), np.abs(found.fitted.theta)
+    assert np.all(found.std_errors[traded] > 1.0)
+    assert np.all(found.std_errors[told] < 0.1 * size[told])
+    for option in found.options:
+        assert option.std_errors is not None
+        assert np.all(option.std_errors[traded] > 1.0)
+        assert option.worth > 0.0
 
 
 def test_a_model_has_no_evidence_against_itself(sharper: Design) -> None:

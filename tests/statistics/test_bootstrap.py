@@ -11,9 +11,20 @@ from runs import HERE, coloured_problem, right_problem
 
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.influence import influence
+from friction_ocp.estimation.problem import StaticUse
 from friction_ocp.estimation.uncertainty import uncertainty
+from friction_ocp.recording.static_points import StaticPoints
+from friction_ocp.result_folder import save
 from friction_ocp.statistics.answer import answer
-from friction_ocp.statistics.bootstrap import bootstrap, one_steps, refit, residual_blocks, signs
+from friction_ocp.statistics.bootstrap import (
+    bootstrap,
+    one_steps,
+    refit,
+    resampled,
+    resampled_score,
+    residual_blocks,
+    signs,
+)
 
 DRAWS = 80
 SCATTER = 0.3
@@ -42,6 +53,46 @@ def test_blocks_are_longer_where_residuals_wander() -> None:
     assert all(item.length_s > 0.02 for item in found.blocks)
     assert all(item.length_s < 0.01 for item in residual_blocks(white.workshop))
     assert found.std_error == pytest.approx(found.estimate.uncertainty.std_error, rel=0.5)
+
+
+def test_static_points_alone_are_drawn_like_recordings(tmp_path: Path) -> None:
+    """Each has a sign of its own: draws scatter by the standard errors of a right model, and the page says so."""
+    rng, error = np.random.default_rng(5), 2e-3
+    speed = np.concatenate([side * np.geomspace(0.05, 20.0, 40) for side in (1.0, -1.0)])
+    torque = np.sign(speed) * 0.07 + 2.2e-3 * speed + error * rng.standard_normal(speed.size)
+    units = {"speed": "rad/s", "torque": "N m", "std_error": "N m"}
+    points = StaticPoints("points", speed, units, torque=torque, std_error=np.full(speed.size, error))
+    problem = replace(right_problem(), train=(), validation=(), static=(StaticUse(points),))
+    shaft = replace(problem.drive.shafts[0], inertia=0.003)
+    found = bootstrap(replace(problem, drive=replace(problem.drive, shafts=(shaft,))), DRAWS, HERE)
+    assert found.blocks == ()
+    assert found.std_error == pytest.approx(found.estimate.uncertainty.std_error, rel=SCATTER)
+    save(found, tmp_path)
+    assert "The error of every static point gets a random sign" in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_static_points_beside_a_recording_take_part_in_every_draw() -> None:
+    """In refits and in steps: else what they alone tell would not scatter."""
+    problem = right_problem()
+    speed = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0])
+    units = {"speed": "rad/s", "torque": "N m", "std_error": "N m"}
+    torque = 0.07 + 2.2e-3 * speed + 1e-3 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    points = StaticPoints("points", speed, units, torque=torque, std_error=np.full(speed.size, 1e-3))
+    found = answer(replace(problem, static=(StaticUse(points),)), HERE)
+    program, best = found.workshop.fitted.program, found.workshop.fitted.solution.point
+    lengths = tuple(item.length_s for item in residual_blocks(found.workshop))
+    drawn = resampled(program, best, lengths, np.random.default_rng(1)).static[0]
+    (term,) = program.static
+    errors = term.predict(program.space, best.theta) - term.measured
+    flipped = term.predict(program.space, best.theta) - drawn.measured
+    assert np.abs(flipped) == pytest.approx(np.abs(errors))
+    assert set(np.sign(flipped * errors)) == {-1.0, 1.0}
+    seen = influence(program, best)
+    alone = replace(seen, score_weight=np.where(seen.recording < len(lengths), 0.0, seen.score_weight))
+    pulls = np.array([resampled_score(alone, lengths, np.random.default_rng(k)) for k in range(400)])
+    own = seen.recording >= len(lengths)
+    expected = np.sqrt(np.sum((seen.jacobian[own] * seen.score_weight[own, None]) ** 2, axis=0))
+    assert pulls.std(axis=0) == pytest.approx(expected, rel=0.15)
 
 
 def test_one_steps_agree_with_refits() -> None:

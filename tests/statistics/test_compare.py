@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from runs import HERE, CoulombViscous, Free, right_problem, with_law
 
-from friction_ocp.drive.parts import Drive
+from friction_ocp.drive.parts import Drive, Gravity
 from friction_ocp.errors import FrictionOcpError
+from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.problem import StaticUse
-from friction_ocp.friction.static import Coulomb, Stribeck, Viscous
+from friction_ocp.friction.static import Coulomb, Quadratic, Stribeck, Viscous
 from friction_ocp.recording.static_points import StaticPoints
 from friction_ocp.report.models_section import models_section
 from friction_ocp.statistics.compare import Comparison, compare
+from friction_ocp.statistics.nesting import is_nested
 from friction_ocp.statistics.scores import scores_of
 from friction_ocp.statistics_document import comparison_document
 
@@ -131,6 +133,18 @@ def test_a_special_case_may_be_stated() -> None:
     assert compare([few, many], execution=HERE).ratios == ()
     with pytest.raises(FrictionOcpError, match="there is no problem 'dry'; one of viscous, coulomb"):
         compare([few, many], [("viscous", "dry")], HERE)
+
+
+@pytest.mark.parametrize(("torque", "nested"), [(0.0, True), (0.5, False)])
+def test_what_the_general_model_lacks_has_to_be_off(torque: float, nested: bool) -> None:
+    """A known gravity torque is no special case of a drive without any; nor is a known Stribeck rise."""
+    general = with_law(Quadratic(TAU_C, VISCOUS, Free(0.001, 0.0, 1.0)), 1)
+    special = with_law(CoulombViscous(TAU_C, VISCOUS), 1)
+    (shaft,) = special.drive.shafts
+    hung = replace(special, drive=replace(special.drive, shafts=(replace(shaft, gravity=Gravity(torque, 0.0)),)))
+    assert is_nested(prepare(hung), prepare(general)) is nested
+    assert is_nested(prepare(special), prepare(general))
+    assert not is_nested(prepare(with_law(Stribeck(TAU_C, 0.2, 1.0, VISCOUS), 1)), prepare(general))
 
 
 def test_static_points_are_compared_like_recordings() -> None:
