@@ -60,6 +60,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             "kind": estimate.uncertainty.kind,
             "names": [item.name for item in estimate.parameters],
             "matrix": _matrix(estimate.uncertainty.covariance),
+            "freedom": number(estimate.uncertainty.freedom),
         },
         "correlation": {
             "names": [item.name for item in estimate.parameters],

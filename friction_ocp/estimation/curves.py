@@ -18,7 +18,6 @@ from friction_ocp.friction.static import NoFriction
 from friction_ocp.simulation.grid import FloatArray
 
 POINTS = 201
-REACH = 1.96
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,11 @@ class FrictionCurve:
 
 
 def friction_curves(
-    model: Model, theta: FloatArray, covariance: FloatArray, runs: tuple[FreeRun, ...]
+    model: Model, theta: FloatArray, covariance: FloatArray, reach: float, runs: tuple[FreeRun, ...]
 ) -> tuple[FrictionCurve, ...]:
     """Return the friction of every shaft over the speeds that the recordings reach, with 95 % bands.
 
+    `covariance` is (parameters, parameters), `reach` half an interval of 95 % over its standard error.
     Parameters at a bound count as known there; where nothing is known of any, bands are NaN.
     """
     mech = model.drive.mechanism
@@ -53,7 +53,7 @@ def friction_curves(
         ]
         fastest = max(reached) or 1.0
         for load in _loads(model, shaft, theta, runs):
-            curves.append(_curve(model, shaft, theta, covariance, fastest, load))
+            curves.append(_curve(model, shaft, theta, reach**2 * covariance, fastest, load))
     return tuple(curves)
 
 
@@ -109,8 +109,9 @@ def _gravity(mech: Mechanism, name: str, at: Motion) -> ca.SX:
 
 
 def _curve(
-    model: Model, shaft: Shaft, theta: FloatArray, covariance: FloatArray, fastest: float, load: float
+    model: Model, shaft: Shaft, theta: FloatArray, band: FloatArray, fastest: float, load: float
 ) -> FrictionCurve:
+    """Return one curve; `band` (parameters, parameters) is the covariance times the square of the reach."""
     omega = ca.SX.sym("omega")
     parameters = ca.vertcat(*model.drive.mechanism.parameters.values())
     element = shaft.friction
@@ -122,7 +123,7 @@ def _curve(
     numbers, slope = model.space.numbers_and_slope(theta, model.problem.fitted[0].name)
     values, by_active = function.map(grid.size)(grid[None, :], numbers)
     by_theta = np.asarray(by_active).reshape(grid.size, -1) @ slope
-    known = np.nan_to_num(covariance) if np.isfinite(covariance).any() else covariance
-    reach = REACH * np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by_theta, known, by_theta), 0.0))
+    known = np.nan_to_num(band) if np.isfinite(band).any() else band
+    half = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", by_theta, known, by_theta), 0.0))
     values = np.asarray(values).ravel()
-    return FrictionCurve(shaft.name, element.law.name, load, grid, values, values - reach, values + reach)
+    return FrictionCurve(shaft.name, element.law.name, load, grid, values, values - half, values + half)

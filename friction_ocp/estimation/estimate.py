@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -35,6 +36,9 @@ from friction_ocp.estimation.whiteness import Whiteness, told_by_rounding, white
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Squares
+
+LOUDER = 1.1
+"""Residuals over their noise floor, root mean square, from which intervals that trust it are off by a tenth."""
 
 ChannelErrors = Mapping[str, tuple[Errors, Mapping[str, Errors]]]
 
@@ -155,11 +159,16 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
     problem, solution = model.problem, fitted.solution
     theta = solution.point.theta
     found = influence(fitted.program, solution.point)
-    residuals = _residual_tests(model, fitted)
+    asked = _asked_residuals(model, fitted)
+    residuals = {
+        name: {channel: whiteness(item.time, item.tested) for channel, item in found_in.items()}
+        for name, found_in in asked.items()
+    }
     simulation = simulate_model(model, theta)
     missed = [fit for fit in simulation.static if fit.split == "train" and misses_points(fit)]
     white = all(test.white for tests in residuals.values() for test in tests.values()) and not missed
-    doubt = uncertainty(model.space, theta, found, white, problem.estimation.loss == "absolute")
+    louder = _louder(asked) if white and problem.estimation.loss == "squares" else {}
+    doubt = uncertainty(model.space, theta, found, white and not louder, problem.estimation.loss)
     judged = verdicts(model.space, theta, doubt)
     too_fast = beyond_sampling(model, theta, named_in_trades(model.space, judged))
     judged = beyond_the_log(model.space, judged, too_fast)
@@ -174,10 +183,11 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         uncertainty=doubt,
         simulation=simulation,
         residuals=residuals,
-        curves=friction_curves(model, theta, doubt.covariance, simulation.train),
+        curves=friction_curves(model, theta, doubt.covariance, doubt.reach, simulation.train),
         warnings=(
             *warnings_of(solution, parameters, doubt, residuals, simulation, _drifts(model, simulation, white)),
             *(_missed_warning(fit) for fit in missed),
+            *(_loud_warning(name, ratio) for name, ratio in louder.items()),
         ),
         solver=SolverFacts(
             problem.estimation.solver,
@@ -189,6 +199,15 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         ),
         noise_levels=model.noise_levels,
     )
+
+
+def _louder(asked: Mapping[str, Mapping[str, _Asked]]) -> dict[str, float]:
+    """Return the channels whose residuals are larger than their noise floor, and how many times."""
+    errors: dict[str, list[FloatArray]] = {}
+    for channel, item in chain.from_iterable(found.items() for found in asked.values()):
+        errors.setdefault(channel, []).append(item.left[np.isfinite(item.left)])
+    ratios = {name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) for name, parts in errors.items()}
+    return {name: ratio for name, ratio in ratios.items() if ratio > LOUDER}
 
 
 def _drifts(model: Model, simulation: Simulation, white: bool) -> dict[str, float]:
@@ -204,6 +223,13 @@ def _drifts(model: Model, simulation: Simulation, white: bool) -> dict[str, floa
     noise = joining(model) if model.process_noise else made_by_inputs(model)
     moved = np.sqrt(within(model, noise, model.train[0], seconds)) / model.noise
     return dict(zip(model.drive.output_names, map(float, moved), strict=True))
+
+
+def _loud_warning(name: str, ratio: float) -> str:
+    return (
+        f"Residuals of {name} are {ratio:.3g} times its noise floor, and white: the floor is stated too low, or "
+        "samples are spoilt (a robust loss lets these be). The standard errors are the robust (sandwich) ones."
+    )
 
 
 def _missed_warning(fit: StaticFit) -> str:
@@ -264,28 +290,38 @@ def _parameter_estimates(
     )
 
 
-def _residual_tests(model: Model, fitted: Fitted) -> dict[str, dict[str, Whiteness]]:
-    """Test what is left; where noise joins nodes, which then are drawn to samples, what was not to be expected.
+@dataclass(frozen=True)
+class _Asked:
+    """Residuals of a channel of a recording over its noise floor, (n,), NaN where they are missing or tell nothing."""
 
-    Samples of counters that tell nothing but their rounding are not asked.
+    time: FloatArray
+    left: FloatArray
+    tested: FloatArray
+
+
+def _asked_residuals(model: Model, fitted: Fitted) -> dict[str, dict[str, _Asked]]:
+    """Return by recording and channel what is left, and what of it is tested for being white.
+
+    Where noise joins nodes, which then are drawn to samples, that is what was not to be expected. Samples of counters
+    that tell nothing but their rounding are not asked.
     """
     program, point = fitted.program, fitted.solution.point
     is_short = sum(item.grid.time.size for item in program.experiments) <= MOST_SAMPLES
     by_noise = program.drive.noisy_inputs or (model.process_noise and is_short)
-    tests: dict[str, dict[str, Whiteness]] = {}
+    found: dict[str, dict[str, _Asked]] = {}
     for index, item in enumerate(program.experiments):
         cut, predicted = program.segments[index], program.simulate(index, point).y
         residuals = left = program.residuals(index, predicted)
         if by_noise and cut.gap_weight is not None and not cut.measured and isinstance(program.loss, Squares):
             residuals = innovations(program, point, index)
-        tests[item.name] = {}
+        found[item.name] = {}
         for column, channel in enumerate(model.problem.drive.outputs):
             seen = np.isfinite(residuals[:, column])
             step = step_of(channel, item.measured[np.isfinite(item.measured[:, column]), column])
             if step is not None:
-                errors = left[:, column] * program.noise[column]
-                seen &= ~told_by_rounding(predicted[:, column], errors, step)
+                rounding = told_by_rounding(predicted[:, column], left[:, column] * program.noise[column], step)
+                seen &= ~rounding
             if seen.sum() > 10:
-                asked = np.where(seen, residuals[:, column], np.nan)
-                tests[item.name][channel.name] = whiteness(item.grid.time, asked)
-    return tests
+                tested, over_floor = (np.where(seen, errors[:, column], np.nan) for errors in (residuals, left))
+                found[item.name][channel.name] = _Asked(item.grid.time, over_floor, tested)
+    return found

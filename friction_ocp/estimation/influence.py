@@ -11,7 +11,10 @@ from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.static_points import StaticTerm
-from friction_ocp.simulation.grid import FloatArray, IntArray
+from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+
+Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray, FloatArray]
+"""Jacobian, residuals, their scores and curvatures, whether they go by the loss, times."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,8 @@ class Influence:
     """(rows,) rho'(r)."""
     curvature: FloatArray
     """(rows,) the weight of each row in the information matrix."""
+    by_loss: BoolArray
+    """(rows,) whether the loss of the estimation goes by it; gaps, noise of inputs and static points are squares."""
     recording: IntArray
     """(rows,) index of the recording; static points count on behind the recordings."""
     window: IntArray
@@ -49,17 +54,21 @@ def influence(program: Program, point: Point) -> Influence:
         for index in range(len(program.experiments))
     ]
     parts += [_of_points(term, program.space, point.theta) for term in program.static]
-    jacobian, residual, weight, curvature, time = (np.concatenate(column) for column in zip(*parts, strict=True))
-    windows = [_windows(program, index, part[4]) for index, part in enumerate(parts)]
+    joined = (np.concatenate(column) for column in zip(*parts, strict=True))
+    jacobian, residual, weight, curvature, by_loss, time = joined
+    windows = [_windows(program, index, part[5]) for index, part in enumerate(parts)]
     recording = np.concatenate([np.full(part[1].size, index) for index, part in enumerate(parts)])
     pull = np.where(np.isfinite(program.space.prior_std), program.space.prior_std, np.inf) ** -2.0
     window = np.concatenate(windows)
-    return Influence(jacobian, residual, weight, curvature, recording, window, time, np.diag(pull))
+    return Influence(jacobian, residual, weight, curvature, by_loss, recording, window, time, np.diag(pull))
 
 
-def _of_noise(
-    program: Program, point: Point, index: int, nodes: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def _squares(jacobian: FloatArray, errors: FloatArray, time: FloatArray) -> Columns:
+    """Return rows whose cost is half their square."""
+    return jacobian, errors, errors, np.ones(errors.size), np.zeros(errors.size, dtype=bool), time
+
+
+def _of_noise(program: Program, point: Point, index: int, nodes: FloatArray) -> Columns:
     """Return the rows of the noise of inputs found at every node; `nodes` (segments, states, parameters) are slopes."""
     cut, item = program.segments[index], program.experiments[index]
     assert cut.start_weight is not None
@@ -68,7 +77,7 @@ def _of_noise(
     errors: FloatArray = (weight * point.nodes[index][cut.tied][:, columns]).ravel()
     rows = (weight[:, :, None] * nodes[cut.tied][:, columns]).reshape(errors.size, -1)
     at = np.repeat(item.grid.time[cut.first[cut.tied]], len(columns))
-    return rows, errors, errors, np.ones(errors.size), at
+    return _squares(rows, errors, at)
 
 
 def _windows(program: Program, index: int, time: FloatArray) -> IntArray:
@@ -78,16 +87,12 @@ def _windows(program: Program, index: int, time: FloatArray) -> IntArray:
     return program.segments[index].owner(np.searchsorted(program.experiments[index].grid.time, time))
 
 
-def _of_points(
-    term: StaticTerm, space: ParameterSpace, theta: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def _of_points(term: StaticTerm, space: ParameterSpace, theta: FloatArray) -> Columns:
     errors, slope = term.residuals(space, theta)
-    return slope, errors, errors, np.ones(errors.size), np.arange(errors.size, dtype=np.float64)
+    return _squares(slope, errors, np.arange(errors.size, dtype=np.float64))
 
 
-def _of_recording(
-    program: Program, point: Point, index: int, by_theta: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def _of_recording(program: Program, point: Point, index: int, by_theta: FloatArray) -> Columns:
     item, cut = program.experiments[index], program.segments[index]
     result = program.simulate(index, point, derivatives=True)
     assert result.dend is not None
@@ -102,15 +107,16 @@ def _of_recording(
     rows, residual = program.output_slopes(index, result, slope, nodes)[seen], errors[seen]
     time = np.broadcast_to(item.grid.time[:, None], errors.shape)[seen]
     loss = program.loss
-    parts = [(rows, residual, loss.weight(residual) * residual, loss.curvature(residual), time)]
+    score = loss.weight(residual) * residual
+    parts = [(rows, residual, score, loss.curvature(residual), np.ones(residual.size, dtype=bool), time)]
     if cut.gap_weight is not None and cut.count > 1:
         flat = program.gap_errors(index, point, result.end).ravel()
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]
         moved = cut.weights(point.theta) @ (moved + result.dend[:-1, :, states:] @ slope)
         moved += cut.weighed_slopes(result.end[:-1] - point.nodes[index][1:], point.theta.size)
         at = np.repeat(item.grid.time[cut.first[1:-1]], states)
-        parts.append((moved.reshape(-1, slope.shape[1]), flat, flat, np.ones(flat.size), at))
+        parts.append(_squares(moved.reshape(-1, slope.shape[1]), flat, at))
     if program.drive.noisy_inputs:
         parts.append(_of_noise(program, point, index, nodes))
-    order = np.argsort(np.concatenate([part[4] for part in parts]), kind="stable")
+    order = np.argsort(np.concatenate([part[5] for part in parts]), kind="stable")
     return tuple(np.concatenate(column)[order] for column in zip(*parts, strict=True))  # pyright: ignore[reportReturnType]

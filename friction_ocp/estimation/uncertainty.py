@@ -12,6 +12,7 @@ import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.influence import Influence
 from friction_ocp.estimation.parameter_space import ParameterSpace
+from friction_ocp.estimation.problem import Loss
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
 stats: Any = _stats  # its own types are incomplete
@@ -54,32 +55,43 @@ class Uncertainty:
         """(parameters, parameters)."""
         return self.covariance / np.outer(self.std_error, self.std_error)
 
+    @property
+    def reach(self) -> float:
+        """Standard errors from an estimate to the ends of its interval at 95 %."""
+        return reach95(self.freedom)
+
     def interval(self, theta: FloatArray) -> FloatArray:
         """Return (parameters, 2) intervals at 95 %."""
-        reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.freedom)) * self.std_error
-        return np.column_stack([theta - reach, theta + reach])
+        half = self.reach * self.std_error
+        return np.column_stack([theta - half, theta + half])
 
     def withheld(self) -> Uncertainty:
         """Return it without covariance: that of an iterate that is no optimum says nothing of the parameters."""
         return dataclasses.replace(self, covariance=np.full_like(self.covariance, np.nan))
 
 
-def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, white: bool, absolute: bool) -> Uncertainty:
+def reach95(freedom: float) -> float:
+    """Return how many standard errors, known to some degrees of freedom, an interval at 95 % reaches to either side."""
+    return float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+
+
+def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, sure: bool, loss: Loss) -> Uncertainty:
     """Return the covariance on the parameters that are not at a bound.
 
-    With white residuals it is the inverse Hessian; otherwise, and for losses that are no likelihood of the noise,
-    what leaving out one block of neighbouring residuals after the other makes of it: the sandwich H^-1 B H^-1 with each
-    block's share of the information taken out (Huber 1967; Bell & McCaffrey 2002, the jackknife). Without that few
-    blocks with much to tell make intervals too short.
+    Where it is `sure` that residuals are white noise of the stated floors it is the inverse Hessian of their squares;
+    otherwise, and for losses that need not be the likelihood of the noise, what leaving out one block of neighbouring
+    residuals after the other makes of it: the sandwich H^-1 B H^-1 with each block's share of the information taken out
+    (Huber 1967; Bell & McCaffrey 2002, the jackknife). Without that few blocks with much to tell make intervals too
+    short.
     """
-    weight = _density_weight(found) if absolute else found.curvature
+    weight = _density_weight(found) if loss == "absolute" else found.curvature
     information = found.jacobian.T @ (weight[:, None] * found.jacobian) + found.prior
     bound = space.at_bounds(theta)
     free = ~bound
     own = np.ix_(free, free)
     told, untold = inverse_information(information[own])
     covariance = np.full(information.shape, np.nan)
-    if white and not absolute:
+    if sure and (loss == "squares" or not found.by_loss.any()):
         covariance[own] = told + untold
         return Uncertainty(covariance, "gauss_newton", bound, np.inf, information)
     moved = _jackknifed(found, weight, free, information[own], told)
@@ -90,12 +102,14 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, whit
 
 
 def _density_weight(found: Influence) -> FloatArray:
-    """Curvature of the absolute loss: twice the density of the residuals at zero (Silverman's bandwidth)."""
-    r = found.residual
+    """Curvature of the absolute loss: twice the density of its residuals at zero (Silverman's bandwidth)."""
+    r = found.residual[found.by_loss]
+    if not r.size:
+        return found.curvature
     spread = min(float(np.std(r)), float(np.subtract(*np.quantile(r, [0.75, 0.25]))) / 1.34)
     width: float = 0.9 * spread * r.size**-0.2
     density = float(np.mean(np.exp(-0.5 * (r / width) ** 2))) / (width * np.sqrt(2.0 * np.pi))
-    return np.full(r.size, 2.0 * density)
+    return np.where(found.by_loss, 2.0 * density, found.curvature)
 
 
 def inverse_information(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.estimation.estimate import Estimate, ParameterEstimate
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.estimation.uncertainty import CONFIDENCE, uncertainty
+from friction_ocp.estimation.uncertainty import uncertainty
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.execution.task import Outcome, Task
 from friction_ocp.simulation.grid import FloatArray
@@ -21,8 +20,6 @@ from friction_ocp.statistics.answer import Answer, answer
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.misfit import mean_weight, plain_covariance
 from friction_ocp.statistics.walk import STEPS_TO_THRESHOLD, Aim, walk_side
-
-stats: Any = _stats  # its own types are incomplete
 
 BETTER = 0.1
 """Fall of the scaled likelihood ratio below the optimum that is worth a warning."""
@@ -84,7 +81,7 @@ def profile(problem: Problem, parameters: Sequence[str] = (), execution: Executi
         allowed = f"fitted are {', '.join(names)}"
         raise FrictionOcpError([Finding("profile", f"'{name}' is not fitted", allowed) for name in unknown])
     chosen = [k for k, name in enumerate(names) if not parameters or name in parameters]
-    threshold = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, found.estimate.uncertainty.freedom)) ** 2
+    threshold = found.estimate.uncertainty.reach**2
     aims = _aims(found, threshold)
     tasks = [
         Task(f"{names[k]}.{'up' if side > 0 else 'down'}", walk_side, (replace(aims[k], direction=side),))
@@ -102,8 +99,7 @@ def _aims(found: Answer, threshold: float) -> list[Aim]:
     theta = found.workshop.fitted.solution.point.theta
     free = replace(space, lower=np.full(theta.size, -np.inf), upper=np.full(theta.size, np.inf))
     seen = influence(found.workshop.fitted.program, found.workshop.fitted.solution.point)
-    absolute = found.workshop.problem.estimation.loss == "absolute"
-    opened = uncertainty(free, theta, seen, doubt.kind == "gauss_newton", absolute)
+    opened = uncertainty(free, theta, seen, doubt.kind == "gauss_newton", found.workshop.problem.estimation.loss)
     aims: list[Aim] = []
     for k in range(theta.size):
         kept = ~doubt.at_bound

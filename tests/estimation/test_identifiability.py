@@ -32,7 +32,7 @@ def judge(
     """Return the verdicts on a regression."""
     bounds = space(theta, lower, upper, prior_std)
     return verdicts(
-        bounds, theta, uncertainty(bounds, theta, regression(x, np.zeros(ROWS), prior_std=prior_std), True, False)
+        bounds, theta, uncertainty(bounds, theta, regression(x, np.zeros(ROWS), prior_std=prior_std), True, "squares")
     )
 
 

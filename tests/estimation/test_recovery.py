@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.stats
 from axes import ENCODER_NOISE, TRUTH, fitted_axis, measured_axis
 from servo_problem import SERVO_PROBLEMS
 
@@ -53,6 +56,24 @@ def test_the_friction_curve_covers_the_truth(estimate: Estimate) -> None:
     truth = np.sign(speed) * TRUTH["motor.friction.tau_c"] + TRUTH["motor.friction.viscous"] * speed
     half = 0.5 * (curve.upper - curve.lower)[moving]
     assert np.all(np.abs(torque - truth) < FAR / 1.96 * half)
+
+
+def test_a_floor_that_is_stated_too_low_does_not_make_the_answer_sure(estimate: Estimate) -> None:
+    """Residuals are white and three times as large: the intervals go by them, and a warning says so."""
+    stated = fitted_axis(measured_axis(1), measured_axis(2))
+    *others, position = stated.drive.channels
+    channels = (*others, replace(position, noise_std=ENCODER_NOISE / 3.0))
+    found = identify(replace(stated, drive=replace(stated.drive, channels=channels)))
+    assert all(tests["position"].white for tests in found.residuals.values())
+    assert found.uncertainty.kind == "sandwich"
+    assert re.match(r"Residuals of position are 3\.\d+ times its noise floor, and white", found.warnings[-1])
+    for item, right in zip(found.parameters, estimate.parameters, strict=True):
+        assert abs(item.value - TRUTH[item.name]) < FAR * item.std_error
+        assert item.std_error > 0.5 * right.std_error
+    (curve,), known = found.curves, found.uncertainty
+    slope = np.array([0.0, 1.0, curve.speed[-1]])
+    half = scipy.stats.t.ppf(0.975, known.freedom) * np.sqrt(slope @ known.covariance @ slope)
+    assert 0.5 * (curve.upper[-1] - curve.lower[-1]) == pytest.approx(half)
 
 
 def test_an_interrupt_keeps_the_last_iterate() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -9,6 +11,7 @@ import scipy.stats
 from regressions import autoregressive, regression, space
 
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
+from friction_ocp.simulation.losses import Huber
 
 ROUNDING = 1e-9
 SCATTER = 0.2
@@ -31,7 +34,7 @@ def judged(
 ) -> Uncertainty:
     """Return the uncertainty of a regression whose parameters are well inside their bounds."""
     found = regression(x, noise, prior_std=prior_std, recordings=recordings, window=window)
-    return uncertainty(space(np.ones(x.shape[1]), -10, 10, prior_std), np.ones(x.shape[1]), found, white, False)
+    return uncertainty(space(np.ones(x.shape[1]), -10, 10, prior_std), np.ones(x.shape[1]), found, white, "squares")
 
 
 def test_white_residuals_give_the_covariance_of_regression() -> None:
@@ -154,7 +157,7 @@ def test_robust_intervals_are_those_of_students_t() -> None:
 def test_a_parameter_at_its_bound_is_held_and_has_no_error() -> None:
     """The others have the covariance of a regression without it."""
     x, theta = design(300), np.array([0.0, 1.0, 2.0])
-    found = uncertainty(space(theta, 0.0, 10.0), theta, regression(x, np.zeros(300)), True, False)
+    found = uncertainty(space(theta, 0.0, 10.0), theta, regression(x, np.zeros(300)), True, "squares")
     assert found.at_bound.tolist() == [True, False, False]
     assert np.all(np.isnan(found.covariance[0])) and np.all(np.isnan(found.covariance[:, 0]))
     assert found.covariance[1:, 1:] == pytest.approx(np.linalg.inv(x[:, 1:].T @ x[:, 1:]), rel=ROUNDING)
@@ -180,6 +183,36 @@ def test_a_direction_without_information_is_vague_not_undefined(white: bool) -> 
     assert sum_variance == pytest.approx(1.0 / float(x[:, 0] @ x[:, 0]), rel=0.1 if white else 1.0)
 
 
+@pytest.mark.parametrize("outliers", [0.0, 0.2])
+def test_a_robust_loss_need_not_be_the_likelihood_of_the_noise(outliers: float) -> None:
+    """The spread of a mean by Huber's loss is what many draws show, with outliers of ten floors and without."""
+    rows, rng, loss = 1000, np.random.default_rng(7), Huber()
+    x, inside = np.ones((rows, 1)), space(np.zeros(1), -10, 10)
+    ends, errors = list[float](), list[float]()
+    for _ in range(200):
+        noise = rng.standard_normal(rows) * np.where(rng.random(rows) < outliers, 10.0, 1.0)
+        end = 0.0
+        for _ in range(30):
+            weight = loss.weight(noise - end)
+            end = float(weight @ noise / weight.sum())
+        left = end - noise
+        found = replace(regression(x, left, loss.weight(left) * left), curvature=loss.curvature(left))
+        doubt = uncertainty(inside, np.zeros(1), found, True, "huber")
+        assert doubt.kind == "sandwich"
+        ends.append(end)
+        errors.append(float(doubt.std_error[0]))
+    assert np.mean(errors) == pytest.approx(np.std(ends), rel=SCATTER)
+
+
+def test_rows_beside_the_absolute_loss_keep_their_weight() -> None:
+    """Static points and gaps are squares: alone they have the intervals of regression, whatever the loss."""
+    x, theta = design(300), np.ones(3)
+    squares = replace(regression(x, np.random.default_rng(2).standard_normal(300)), by_loss=np.zeros(300, dtype=bool))
+    found = uncertainty(space(theta, -10, 10), theta, squares, True, "absolute")
+    assert found.kind == "gauss_newton"
+    assert found.covariance == pytest.approx(np.linalg.inv(x.T @ x), rel=ROUNDING)
+
+
 def test_the_absolute_loss_has_the_covariance_of_least_absolute_deviations() -> None:
     """For Laplace noise of scale s it is s^2 (X'X)^-1, whatever the noise floor (Bassett & Koenker 1978)."""
     rows, scale, rng = 3000, 4.0, np.random.default_rng(5)
@@ -188,6 +221,6 @@ def test_the_absolute_loss_has_the_covariance_of_least_absolute_deviations() -> 
     for _ in range(40):
         noise = rng.laplace(scale=scale, size=rows)
         variances.append(
-            np.diag(uncertainty(inside, theta, regression(x, noise, np.sign(noise)), True, True).covariance)
+            np.diag(uncertainty(inside, theta, regression(x, noise, np.sign(noise)), True, "absolute").covariance)
         )
     assert np.mean(variances, axis=0) == pytest.approx(scale**2 * np.diag(np.linalg.inv(x.T @ x)), rel=2 * SCATTER)

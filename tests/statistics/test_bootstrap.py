@@ -113,7 +113,7 @@ def test_relaxed_segments_take_one_step() -> None:
     assert (found.method, found.failed) == ("one_step", 0)
     fitted = answer(relaxed, HERE).workshop.fitted
     seen = influence(fitted.program, fitted.solution.point)
-    sandwich = uncertainty(fitted.program.space, fitted.solution.point.theta, seen, white=False, absolute=False)
+    sandwich = uncertainty(fitted.program.space, fitted.solution.point.theta, seen, sure=False, loss="squares")
     assert found.std_error == pytest.approx(sandwich.std_error, rel=0.5)
 
 
