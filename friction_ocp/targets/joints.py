@@ -117,6 +117,8 @@ def joint_drive(fitted: Fitted, elastic: bool = True) -> JointDrive:
     )
     late = [item for item in fitted.model.problem.drive.motors if not is_off(item.dead_time)]
     losses += [Loss(f"{item.name}.dead_time", "left out") for item in late]
+    if drive.controller is not None:
+        losses.append(Loss("controller", "left out: the actuators take its output as their command"))
     losses += [loss for item in drive.transmissions for loss in _transmission_losses(item)]
     return JointDrive(joints, springs, actuators, tuple(losses))
 
@@ -244,4 +246,6 @@ def _actuator(
     for key in ("cogging", "torque_ripple", "saturation"):
         if getattr(motor, key) is not None:
             losses.append(Loss(f"{motor.name}.{key}", "left out"))
+    if float(motor.share) != 1.0:
+        losses.append(Loss(f"{motor.name}.share", f"left out: it takes {float(motor.share):.4g} x what was recorded"))
     return Actuator(motor.name, joint.name, gear, gain, bias, command, float(motor.lag or 0.0))

@@ -22,6 +22,8 @@ def urdf_losses(drive: JointDrive) -> tuple[Loss, ...]:
         back_emf = f" - {-item.bias * item.gear**2:.6g} x speed" if item.bias else ""
         effort = f"effort = {item.gear * item.gain:.6g} x {item.command}{back_emf}"
         losses.append(Loss(f"motor {item.name}", f"left out: {effort}"))
+        if item.lag:
+            losses.append(Loss(f"{item.name}.lag", f"left out: the torque follows within {item.lag:.3g} s"))
     return tuple(losses)
 
 

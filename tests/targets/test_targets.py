@@ -30,7 +30,7 @@ from friction_ocp.targets.mujoco_run import MuJoCoRun
 from friction_ocp.targets.price import price_table, price_text
 from friction_ocp.targets.table import table_text
 from friction_ocp.targets.tracking import tracking_gain
-from friction_ocp.targets.urdf import urdf_text
+from friction_ocp.targets.urdf import urdf_losses, urdf_text
 
 SAME_CODE = 1e-9
 """The same arithmetic, compiled by another call."""
@@ -48,7 +48,7 @@ def test_mujoco_adds_next_to_nothing_to_coulomb_and_viscous_friction(tmp_path: P
     """The recorded servo in MuJoCo stays nearer to its free run here than 2 % of the error of that run."""
     fitted = load_fitted(servo(tmp_path))
     drive = joint_drive(fitted)
-    assert drive.losses == ()
+    assert [loss.term for loss in drive.losses] == ["controller"]
     rows = price_table(fitted, MuJoCoRun(fitted, drive, mjcf_text(drive, fitted.name), False).simulate)
     assert [row.recording for row in rows] == ["sin_sin-kp400"]
     assert 0.0 < rows[0].share < ADDED
@@ -79,6 +79,13 @@ def test_a_dead_time_cannot_be_expressed(tmp_path: Path) -> None:
     motor = {"torque_constant": 0.5, "dead_time": 0.008}
     losses = joint_drive(load_fitted(axis(tmp_path, drive__motor=motor))).losses
     assert [loss.term for loss in losses] == ["motor.dead_time"]
+
+
+def test_a_share_of_the_command_and_a_lag_are_named(tmp_path: Path) -> None:
+    """Whoever feeds the recorded current to the exported joint would get 1 / 0.6 of the torque, and in URDF too soon."""
+    drive = joint_drive(load_fitted(axis(tmp_path, drive__motor={"torque_constant": 0.5, "share": 0.6, "lag": 0.02})))
+    assert [str(loss) for loss in drive.losses] == ["motor.share: left out: it takes 0.6 x what was recorded"]
+    assert "motor.lag: left out: the torque follows within 0.02 s" in [str(loss) for loss in urdf_losses(drive)]
 
 
 @pytest.mark.parametrize("angle", [-2.0, 0.0, 1.3])
