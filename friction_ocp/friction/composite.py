@@ -150,7 +150,7 @@ class Bristle:
     """Elastic contact before breakaway."""
 
     sigma0: Value = quantity("stiffness", "bristle stiffness")
-    sigma1: Value = quantity("viscous", "bristle damping", 0.0)
+    sigma1: Value = quantity("damping", "bristle damping", 0.0)
     springs: BristleSprings | None = None
 
 

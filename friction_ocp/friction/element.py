@@ -111,8 +111,11 @@ class FrictionElement:
         return transmitted * (share + load.viscous * speed if with_viscous else share)
 
     def torque(self, omega: Any, transmitted: Any = 0.0, width: Any = 0.0) -> Any:
-        """Return the steady-state friction torque at the signed speed `omega`, its jump rounded over `width`."""
-        speed = smooth_abs(omega)
+        """Return the steady-state friction torque at the signed speed `omega`, its jump rounded over `width`.
+
+        The speed is rounded as the sign is: drag keeps its slope at standstill.
+        """
+        speed = smooth_abs(omega, width)
         positive, negative = (self.magnitude(side, speed, transmitted) for side in ("positive", "negative"))
         return smooth_sign(omega, width) * where(omega >= 0, positive, negative)
 

@@ -38,7 +38,12 @@ def presliding_loop(element: FrictionElement, amplitude: float, speed: float) ->
     torque = _torques(element, h, speed * sign)
     travel = np.cumsum(h * speed * sign)
     begin = LEG // 2 + 2 * LEG - 1
-    return Loop(travel[begin:], torque[begin:])
+    travel, torque = travel[begin:], torque[begin:]
+    if not element.law.has_bristle:  # the torque jumps where the motion turns
+        turns = np.flatnonzero(np.diff(sign[begin:]))
+        travel = np.insert(travel, turns + 1, travel[turns])
+        torque = np.insert(torque, turns + 1, torque[turns + 1])
+    return Loop(travel, torque)
 
 
 def _torques(element: FrictionElement, h: float, omega: FloatArray) -> FloatArray:

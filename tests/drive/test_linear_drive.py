@@ -16,6 +16,7 @@ from friction_ocp.drive.parts import Channel, Drive
 from friction_ocp.plots.bode import bode_figure
 
 ROUNDING = 1e-9
+MOTOR = PlantMotor("motor", "axis", "torque")
 FREQUENCY = np.geomspace(0.05, 500.0, 60)
 
 
@@ -121,6 +122,13 @@ def test_friction_that_grows_with_load_is_linearised_about_its_torque() -> None:
     slope = (acceleration(30.0 + difference) - acceleration(30.0 - difference)) / (2.0 * difference)
     (mode,) = linear.modes
     assert mode.pole.real == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-6, 2.0])
+def test_drag_alone_damps_at_standstill_as_it_does_in_motion(speed: float) -> None:
+    """Without dry friction a rest is nothing special: the pole is - b / J at every speed."""
+    plant = Plant((PlantShaft("axis", 0.01, PlantFriction("viscous", viscous=0.02)),), (), (MOTOR,))
+    assert sorted(linearise(torque_driven(plant, "axis"), speed).poles.real) == pytest.approx([-2.0, 0.0], abs=1e-6)
 
 
 def test_a_bode_picture_shows_what_friction_does() -> None:

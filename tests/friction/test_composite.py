@@ -10,6 +10,7 @@ from friction_ocp.friction.bristle import LuGre
 from friction_ocp.friction.composite import (
     Bend,
     Bristle,
+    Bristled,
     StribeckRise,
     added_terms,
     plain_law,
@@ -37,6 +38,15 @@ BASE = CoulombViscous(1.0, 0.2)
 def test_added_terms_make_the_laws_that_have_them(terms: dict[str, object], whole: AbstractFrictionLaw) -> None:
     """Coulomb and viscous friction with a further term is the law of the catalogue that has that term."""
     assert np.allclose(with_added(BASE, **terms).magnitude(SPEED), whole.magnitude(SPEED), rtol=0, atol=1e-14)
+
+
+def test_what_warms_up_leaves_the_damping_of_bristles_alone() -> None:
+    """Levels, stiffness and drag follow their factors, as those of LuGre friction do."""
+    lugre = LuGre(1.0, 1.0, 2.0, 50.0, 0.7, 0.2).scaled(2.0, 3.0)
+    scaled = with_bristle(BASE, Bristle(50.0, 0.7)).scaled(2.0, 3.0)
+    assert isinstance(scaled, Bristled)
+    assert (scaled.bristle.sigma0, scaled.bristle.sigma1) == (lugre.sigma0, lugre.sigma1) == (50.0, 0.7)
+    assert scaled.magnitude(SPEED) == pytest.approx(lugre.magnitude(SPEED))
 
 
 def test_terms_come_together_and_come_apart() -> None:

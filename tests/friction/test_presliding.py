@@ -127,7 +127,7 @@ def test_a_polyline_reverses_over_its_width() -> None:
 def test_a_law_without_springs_has_a_rectangle() -> None:
     """Coulomb friction alone turns at once."""
     loop = presliding_loop(FrictionElement(Coulomb(0.2)), 1e-3, 1e-4)
-    assert loop.area == pytest.approx(4.0 * 0.2 * 1e-3, rel=1e-2)
+    assert loop.area == pytest.approx(4.0 * 0.2 * 1e-3, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("omega", [3.0, -3.0, 0.02])

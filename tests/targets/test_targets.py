@@ -82,7 +82,7 @@ def test_a_dead_time_cannot_be_expressed(tmp_path: Path) -> None:
 
 
 def test_a_share_of_the_command_and_a_lag_are_named(tmp_path: Path) -> None:
-    """Whoever feeds the recorded current to the exported joint would get 1 / 0.6 of the torque, and in URDF too soon."""
+    """Whoever feeds it the recorded current would get 1 / 0.6 of the torque, and in URDF too soon."""
     drive = joint_drive(load_fitted(axis(tmp_path, drive__motor={"torque_constant": 0.5, "share": 0.6, "lag": 0.02})))
     assert [str(loss) for loss in drive.losses] == ["motor.share: left out: it takes 0.6 x what was recorded"]
     assert "motor.lag: left out: the torque follows within 0.02 s" in [str(loss) for loss in urdf_losses(drive)]
