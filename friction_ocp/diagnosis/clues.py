@@ -62,7 +62,9 @@ def _clues_of(fitted: FittedModel) -> Clues:
     missing = _torques(fitted, watch, typical)
     names = [item.name for item in fitted.linear.program.experiments]
     tracks = tuple(_track(fitted, *parts) for parts in zip(names, tables, *missing, strict=True))
-    return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path))
+    shafts = fitted.model.problem.drive.shafts
+    linear = frozenset(shaft.name for shaft in shafts if shaft.motion == "linear")
+    return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path), linear)
 
 
 def _torques(fitted: FittedModel, watch: _Watch, typical: Mapping[str, float]) -> tuple[list[Missing], list[Missing]]:

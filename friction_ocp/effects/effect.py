@@ -81,6 +81,8 @@ class Clues:
     """By shaft, N m: what moves it."""
     steady: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     """By shaft, rad/s: speeds at which static points were taken, where there are any."""
+    linear: frozenset[str] = frozenset()
+    """Shafts that move along a line: nothing of them comes back with a turn."""
     _known_waves: dict[tuple[str, str, bool, str | None], list[Likely]] = field(
         default_factory=lambda: {}, init=False, repr=False, compare=False
     )
@@ -102,10 +104,10 @@ class Clues:
     ) -> list[float]:
         """Return the likeliest periods of the missing torque of a shaft over its angle ("theta") or "time".
 
-        They are seen twice at least, or come back with every turn: what is longer is a trend. `against_motion` looks
+        They are seen twice at least, or come back with every turn of what turns: what is longer is a trend. `against_motion` looks
         for a wave times the sign of the speed, `against_torque` times a motor's torque. What parameters that are off
         add to the missing torque goes with speed and acceleration, and these with the angle: waves are looked for
-        without that, too. Without a missing torque, harmonics of a turn, or parts of the longest recording.
+        without that, too. Without a missing torque, harmonics of a turn, or parts of the longest travel or recording.
         """
         return [wave.period for wave in self.waves(shaft, over, against_motion, against_torque)]
 
@@ -134,7 +136,8 @@ class Clues:
         whole = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
         travel = max(float(np.ptp(one)) for one in whole)
         lowest = 2.0 / max(travel, 1e-300)
-        if over == "theta":
+        turning = over == "theta" and shaft not in self.linear
+        if turning:
             lowest = min(lowest, 1.0 / (2.0 * np.pi))
         found = likeliest(
             [self._seen(track, shaft, over, against_motion, against_torque) for track in self.tracks], lowest
@@ -142,7 +145,7 @@ class Clues:
         if found:
             return found
         turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
-        usual = turns if over == "theta" else travel / np.array([2.0, 8.0, 32.0])
+        usual = turns if turning else travel / np.array([2.0, 8.0, 32.0])
         return [Likely(float(period)) for period in usual]
 
     @staticmethod

@@ -261,5 +261,6 @@ class KinematicErrorEffect(AbstractWaveEffect):
         _, twist = _twist(item, clues)
         found = [*clues.periods(item.from_shaft, "theta")[:2], *clues.periods(item.to_shaft, "theta")[:2]]
         ratio = abs(clues.numbers.get(f"{place}.ratio", 1.0))
-        periods = [*found[:2], *(ratio * one for one in found[2:]), 2.0 * np.pi, np.pi]
+        turns = [] if item.from_shaft in clues.linear else [2.0 * np.pi, np.pi]
+        periods = [*found[:2], *(ratio * one for one in found[2:]), *turns]
         return 0.1 * twist, [Likely(period) for period in periods]

@@ -50,6 +50,24 @@ def test_a_wave_is_found_beside_a_larger_drift(drift: float) -> None:
     assert min(abs(1.0 / period - TEETH / (2.0 * np.pi)) for period in found[:2]) < 1.0 / travel
 
 
+@pytest.mark.parametrize("wave", [0.0, 0.1])
+def test_a_slide_has_no_turns(wave: float) -> None:
+    """What bends once over the whole travel is a trend; a wave is one from two periods on."""
+    rng = np.random.default_rng(6)
+    time, pitch, travel = INTERVAL * np.arange(SAMPLES), 0.032, 0.3
+    omega = 0.5 * travel * np.pi * np.sin(2.0 * np.pi * time / 2.0)
+    theta = 0.5 * travel * (1.0 - np.cos(2.0 * np.pi * time / 2.0))
+    middle = np.arange(SEGMENT // 2, SAMPLES, SEGMENT)
+    torque = (theta[middle] / travel - 0.5) ** 2 + wave * np.cos(2.0 * np.pi * theta[middle] / pitch)
+    torque += 0.01 * rng.standard_normal(middle.size)
+    missing = Missing(middle, {"slide": torque}, {"slide": theta[middle]}, {"slide": omega[middle]})
+    track = Track(time, {"slide": theta}, {"slide": omega}, {"drive": np.ones(SAMPLES)}, missing, missing)
+    found = Clues((track,), {}, {"slide": 1.0}, linear=frozenset({"slide"})).periods("slide", "theta")
+    assert max(found) < 0.51 * travel
+    if wave:
+        assert min(abs(1.0 / period - 1.0 / pitch) for period in found[:2]) < 1.0 / travel
+
+
 def test_a_wave_is_shown_within_its_period() -> None:
     """What explains a wave is the angle within its period, and the curve over that is the wave; a drift needs none."""
     found = shape(clues(0.1, 0.0), "motor")
