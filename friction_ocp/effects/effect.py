@@ -104,10 +104,11 @@ class Clues:
     ) -> list[float]:
         """Return the likeliest periods of the missing torque of a shaft over its angle ("theta") or "time".
 
-        They are seen twice at least, or come back with every turn of what turns: what is longer is a trend. `against_motion` looks
-        for a wave times the sign of the speed, `against_torque` times a motor's torque. What parameters that are off
-        add to the missing torque goes with speed and acceleration, and these with the angle: waves are looked for
-        without that, too. Without a missing torque, harmonics of a turn, or parts of the longest travel or recording.
+        They are seen twice at least, or come back with every turn of what turns: what is longer is a trend.
+        `against_motion` looks for a wave times the sign of the speed, `against_torque` times a motor's torque. What
+        parameters that are off add to the missing torque goes with speed and acceleration, and these with the angle:
+        waves are looked for without that, too. Without a missing torque, harmonics of a turn, or parts of the longest
+        travel or recording.
         """
         return [wave.period for wave in self.waves(shaft, over, against_motion, against_torque)]
 
