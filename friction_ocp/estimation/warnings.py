@@ -15,6 +15,10 @@ from friction_ocp.estimation.whiteness import Whiteness
 
 VALIDATION_EXCESS = 1.5
 """Validation error over training error from which a warning says that the fit does not carry over."""
+WHAT_TO_DO = (
+    "diagnose says what the model lacks. Where that is noise, of a torque or of a measured input, state "
+    "estimation: {process_noise: {SHAFT: estimate}}, or noise_std at the input."
+)
 
 
 class NamedVerdict(Protocol):
@@ -122,10 +126,12 @@ def _misfit_warnings(
             texts.append(
                 f"{name}: the free run is {errors.rms / train.rms:.1f} times worse on validation than on training."
             )
+    far = False
     for name, (errors, _) in scored.train_errors.items():
         drift = drifts.get(name, 0.0)
         ratio = errors.noise_ratio / float(np.hypot(1.0, drift))
         if ratio > 2.0:
             what = "what noise of its inputs makes of it" if drift > 1.0 else "the noise floor"
             texts.append(f"{name}: the error of the free run is {ratio:.{0 if ratio >= 100 else 1}f} times {what}.")
-    return texts
+            far = True
+    return [*texts, *([WHAT_TO_DO] if far and not drifts else [])]

@@ -7,10 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from friction_ocp.estimation.gauss_newton import Solution
 from friction_ocp.estimation.identifiability import Verdict
 from friction_ocp.estimation.program import Point
+from friction_ocp.estimation.score import Errors
 from friction_ocp.estimation.warnings import warnings_of
 
 
@@ -53,4 +55,20 @@ def test_different_groups_are_different_warnings() -> None:
     assert [text.split(":")[0] for text in texts] == [
         "a = 1 s, b = 2 s are traded with one another",
         "c = 3 s is traded with known",
+    ]
+
+
+@pytest.mark.parametrize(("drifts", "told"), [({}, True), ({"position": 0.1}, False)])
+def test_a_free_run_that_is_far_off_says_what_to_do(drifts: dict[str, float], told: bool) -> None:
+    """Once, below its channels; where noise of torques or inputs is stated already there is nothing more to state."""
+    ended = Solution(Point(np.zeros(0), ()), 1.0, 3, True, "the step is small")
+    far = Errors(1e-3, 8e-4, 0.1, 0.1, 2907.0)
+    unknown: Any = SimpleNamespace(kind="gauss_newton")
+    scored: Any = SimpleNamespace(train_errors={"position": (far, {}), "angle": (far, {})}, validation_errors={})
+    texts = warnings_of(ended, (), unknown, {}, scored, drifts)
+    assert texts[:1] == (f"position: the error of the free run is {2893 if drifts else 2907} times the noise floor.",)
+    assert [text.startswith("diagnose says what the model lacks.") for text in texts] == [
+        False,
+        False,
+        *([True] * told),
     ]
