@@ -27,7 +27,7 @@ from friction_ocp.drive.coordinates import ORDERS
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import Key
+from friction_ocp.effects.effect import Key, moving_shafts
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
@@ -291,7 +291,17 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
         "ratio": diagnosis.remainder.ratio,
         "ratio_before": innovations(diagnosis.base).ratio,
         "slow_torque": slow,
+        "as_torque_noise": component if _may_be_torque_noise(diagnosis, component) else None,
     }
+
+
+def _may_be_torque_noise(diagnosis: Diagnosis, component: str | None) -> bool:
+    """Whether torque noise on a shaft, of which the file states none, would leave what is left: nothing in one step."""
+    if not diagnosis.unexplained or diagnosis.remainder.significant(diagnosis.level):
+        return False
+    shafts = {shaft.name for shaft in moving_shafts(diagnosis.problem.drive)}
+    stated = diagnosis.problem.estimation
+    return component in shafts - (stated.process_noise.keys() - set(stated.estimated_noise))
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:

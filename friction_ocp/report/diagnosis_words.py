@@ -45,7 +45,7 @@ def diagnosis_sentence(result: Json) -> str:
             return f"{told}{_predicted(result)}{_cut_short(result)}"
         case _:
             told = f"There is a gap beyond the noise{_place(result)}, and nothing in the catalogue explains it."
-            return f"{told}{_cut_short(result)}"
+            return f"{told}{_torque_noise(result)}{_cut_short(result)}"
 
 
 def _but_for_stated_values(result: Json) -> bool:
@@ -83,6 +83,16 @@ def _stray(result: Json) -> str:
         return ""
     why = "noise of the start and of the inputs alone sets simulations of this drive as far apart"
     return f". {_one_step(result)}. Free runs say little here: {why}."
+
+
+def _torque_noise(result: Json) -> str:
+    """Say that what is left may be no more than noise of the torque, and how to have that counted."""
+    shaft = part(result, "remainder").get("as_torque_noise")
+    if shaft is None:
+        return ""
+    told = "Errors of one-step predictions are no more than noise, so that it may be torque noise that the file lacks"
+    how = f"identify with estimation: {{process_noise: {{{shaft}: estimate}}}} tells how much that would be"
+    return f" {told}: {how}; stated there as a number, it counts as noise."
 
 
 def _cut_short(result: Json) -> str:

@@ -39,6 +39,16 @@ def test_an_unknown_effect_alone_is_no_part() -> None:
     assert "cannot tell" not in diagnosis_sentence(result("explained"))
 
 
+def test_what_may_be_torque_noise_is_told_with_how_to_have_it_counted() -> None:
+    """Where errors of one-step predictions show nothing, and a slow torque is left on a shaft."""
+    rest = {"as_torque_noise": "slide"}
+    said = diagnosis_sentence(result("unknown_effect", accepted=[], remainder=rest))
+    assert "nothing in the catalogue explains it. Errors of one-step predictions are no more than noise" in said
+    assert "identify with estimation: {process_noise: {slide: estimate}} tells how much that would be" in said
+    rest = {"as_torque_noise": None}
+    assert "process_noise" not in diagnosis_sentence(result("unknown_effect", accepted=[], remainder=rest))
+
+
 def test_aliases_are_told_as_what_recordings_cannot_tell_apart() -> None:
     """Where noise is left, one of the members is the cause."""
     undecided = result("undecided", accepted=[LOAD], alias_sets=[[LOAD, COGGING]])
