@@ -39,6 +39,10 @@ _MORE = 1.2
 """Scatter in every recording over what rounding makes, from which a sensor has noise besides."""
 _ALIKE = 0.9
 """Correlation of speeds from which two sensors see one motion."""
+_APART = 0.5
+"""Correlation of speeds below which two sensors see no one motion, where both show one: noise does not hide it."""
+_MOVES = 10.0
+"""Swing of a signal over its noise from which it shows a motion."""
 _SELDOM = 0.5
 """Sampling interval, s, at which hardly any drive is recorded."""
 
@@ -147,6 +151,37 @@ def _factor(case: Case, first: Channel, second: Channel, ratio: float, use: Reco
     return product / power[0] if abs(product) > _ALIKE * np.sqrt(power[0] * power[1]) else None
 
 
+def sensors_of_one_shaft_see_one_motion(case: Case) -> Iterator[Finding]:
+    """Of shafts that are joined rigidly all sensors show the same motion, whatever their units and signs."""
+    seeing = [channel for channel in case.drive.outputs if channel.signal in ("theta", "omega")]
+    for first, second in combinations(seeing, 2):
+        if case.topology.group_of.get(first.part) != case.topology.group_of.get(second.part):
+            continue
+        found = [_likeness(case, first, second, use) for _, use in case.uses()]
+        alike = [value for value in found if value is not None]
+        if alike and max(alike) < _APART:
+            names = f"'{second.name}' and '{first.name}'"
+            what = f"{names} see no one motion: their speeds correlate by {max(alike):.2f} at most"
+            allowed = "sensors of one shaft, or of shafts that are joined rigidly"
+            remedy = "leave out what is no sensor of it, such as a following error, or correct its clock or delay"
+            yield Finding(case.at(f"channels.{second.name}"), what, allowed, remedy, "warning")
+
+
+def _likeness(case: Case, first: Channel, second: Channel, use: RecordingUse) -> float | None:
+    """Return the correlation of the speeds that two sensors show, without sign; None where noise may hide it."""
+    one, other = case.seen_by(first, use), case.seen_by(second, use)
+    recorded = [use.recording.channels.get(channel.name) for channel in (first, second)]
+    if one is None or other is None or not all(item is not None and _moves(item) for item in recorded):
+        return None
+    known = _at(one, other.time)
+    size = float(np.linalg.norm(known) * np.linalg.norm(other.omega))
+    return abs(float(known @ other.omega)) / size if size > 0.0 else None
+
+
+def _moves(recorded: RecordedChannel) -> bool:
+    return float(np.nanstd(recorded.values)) > _MOVES * high_frequency_noise(recorded.time, recorded.values)
+
+
 def _at(motion: Motion, time: FloatArray) -> FloatArray:
     return np.interp(time, motion.time, motion.omega, left=0.0, right=0.0)
 
@@ -211,6 +246,7 @@ PLAUSIBILITY: tuple[Rule, ...] = (
     resolution_is_seen,
     rounding_is_the_noise,
     sensors_of_one_motion_agree,
+    sensors_of_one_shaft_see_one_motion,
     samples_come_often_enough,
     samples_have_no_gaps,
     samples_are_not_repeated,
