@@ -30,8 +30,6 @@ READERS: Mapping[str, Opener] = {
     ".csv": open_csv,
     ".tsv": open_csv,
     ".txt": open_csv,
-    ".log": open_csv,
-    ".asc": open_csv,
     ".parquet": open_parquet,
     ".mat": open_matlab,
     ".h5": open_hdf5,
@@ -48,6 +46,8 @@ READERS: Mapping[str, Opener] = {
     ".ndjson": open_json,
     ".npy": open_numpy,
     ".npz": open_numpy,
+    ".log": open_csv,
+    ".asc": open_csv,
 }
 """Reader by the suffix of the file; a further format is a further line."""
 _HEAD, _UTF16 = 4096, (b"\xff\xfe", b"\xfe\xff")
