@@ -13,6 +13,7 @@ from friction_ocp.recording.foreign import EXACT_INTEGERS, Values
 from friction_ocp.recording.recording import FloatArray
 
 _MISSING = ("", "nan", "na", "n/a", "#n/a", "#na", "#nv", "null", "none", "-")
+_SWITCH = {"true": 1.0, "false": 0.0}
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE)
 _GROUP = {".": ",", ",": "."}
 """What groups thousands beside each decimal sign."""
@@ -90,9 +91,11 @@ def _is_whole(values: Values) -> bool:
 
 
 def _number(cell: str, decimal: str | None) -> float | None:
-    """Return the value of one cell, NaN where it is missing, None where it is neither."""
+    """Return the value of one cell, a switch as 1 or 0, NaN where it is missing, None where it is neither."""
     if is_missing(cell):
         return np.nan
+    if cell.lower() in _SWITCH:
+        return _SWITCH[cell.lower()]
     if decimal is not None and _GROUPED[decimal].fullmatch(cell):
         cell = cell.replace(_GROUP[decimal], "")
     if decimal == ",":

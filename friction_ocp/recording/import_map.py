@@ -21,6 +21,7 @@ MAX_BRACKETS = 20
 MAP_FORMAT = "friction-ocp-map/1"
 _TEXTS = ("title", "source", "licence", "delimiter", "decimal")
 _KEYS = ("format", "time", "channels", "points", *_TEXTS)
+_STEP_KEYS = {"step": ("time", "a time, such as 1 ms"), "rate": ("frequency", "a frequency, such as 1000 Hz")}
 _COLUMN_KEYS = ("column", "unit", "scale", "wrap", "reset", "instead_of")
 _CHANNEL_KEYS = (*_COLUMN_KEYS, "held", "low_pass", "time")
 _NUMBERS = ("wrap", "reset", "held", "low_pass")
@@ -58,6 +59,8 @@ class ImportMap:
     time: Column | None
     """The times of all channels; None takes the time axes that the file itself has."""
     channels: Mapping[str, Column]
+    step: float | None = None
+    """s between the rows of a file without times, the first being at 0."""
     title: str = ""
     source: str = ""
     licence: str = ""
@@ -157,14 +160,34 @@ class _MapReader:
             self.report("delimiter", what, "one character; ' ' is any spaces and tabs", "leave it out to have it found")
         if texts.get("decimal", ".") not in (".", ","):
             self.report("decimal", f"unknown decimal sign '{texts['decimal']}'", "available: '.', ','")
-        time = self.time("time", keys["time"]) if "time" in keys else None
+        step = self.step(keys.get("time"))
+        time = self.time("time", keys["time"]) if "time" in keys and step is None else None
         points = self.points(keys["points"]) if "points" in keys else {}
-        if points and (time is not None or "channels" in keys):
+        if points and ("time" in keys or "channels" in keys):
             self.report("points", "static points have no times and no channels", "", "leave time and channels out")
         channels = {} if "points" in keys else self.channels(keys.get("channels"))
         if not channels and not points:
             return None
-        return ImportMap(time, channels, points=points, where=self.where, **cast(dict[str, Any], texts))
+        return ImportMap(time, channels, step, points=points, where=self.where, **cast(dict[str, Any], texts))
+
+    def step(self, content: object) -> float | None:
+        """Return the s between rows that are stated in place of a column of times, as `step` or as `rate`."""
+        stated = cast(dict[object, object], content) if isinstance(content, dict) else {}
+        for key, (kind, allowed) in _STEP_KEYS.items():
+            if key not in stated:
+                continue
+            place, text = f"time.{key}", self.text(f"time.{key}", stated[key])
+            for other in stated.keys() - {key}:
+                self.report("time", f"'{other}' stands beside {key}", f"{key} alone, or a column of times")
+            try:
+                size, unit = to_si(1.0, "counts", f"{self.where}: {place}", scale=text)
+                if dimension_of(unit) == kind and float(size) > 0.0:
+                    return float(size) if key == "step" else 1.0 / float(size)
+                self.report(place, f"{key} is {text!r}", allowed)
+            except FrictionOcpError as error:
+                self.findings += error.findings
+            return 1.0
+        return None
 
     def points(self, content: object) -> dict[str, Column]:
         found = self.mapping("points", content, COLUMNS) or {}

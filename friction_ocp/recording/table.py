@@ -154,7 +154,7 @@ def _same(entry: Column, stated: str) -> bool:
 
 
 def _without_time(import_map: ImportMap, wanted: Mapping[str, _Wanted]) -> list[Finding]:
-    if import_map.time is not None:
+    if import_map.time is not None or import_map.step is not None:
         return []
     lost = [
         (name, item)
@@ -164,7 +164,7 @@ def _without_time(import_map: ImportMap, wanted: Mapping[str, _Wanted]) -> list[
         and item.signal.numeric
         and not item.signal.clock
     ]
-    remedy = "name the column of the times, time: {column, unit}"
+    remedy = "name the column of the times, time: {column, unit}, or their step, time: {step: 1 ms} or {rate: 1000 Hz}"
     return [
         Finding(f"{import_map.where}: channels.{name}", f"the file gives '{item.signal.name}' no times", "", remedy)
         for name, item in lost
@@ -246,6 +246,9 @@ def _channels(
             label, time = wanted[f"channels.{name}.time"].signal.name, values[f"channels.{name}.time"][0]
         elif import_map.time is not None:
             label, time = "time", values["time"][0]
+        elif import_map.step is not None:
+            rows = values[f"channels.{name}"][0].size
+            label, time = "time", np.asarray(import_map.step * np.arange(rows), dtype=np.float64)
         else:
             label, time = signal.clock, file.clock(signal.clock)
         clock = next((known for known, axis in axes.items() if np.array_equal(axis, time)), None)

@@ -438,11 +438,40 @@ def test_what_the_file_has_to_say_is_asked_for(tmp_path: Path) -> None:
         import_recording(content, put(tmp_path / "m.yaml", map_of(time="-", channels="{x: {column: x}}")))
     assert [str(item).partition("m.yaml: ")[2] for item in caught.value.findings] == [
         "channels.x: there is no unit, and the file states none for 'x'; {column, unit}",
-        "channels.x: the file gives 'x' no times; name the column of the times, time: {column, unit}",
+        "channels.x: the file gives 'x' no times; name the column of the times, time: {column, unit}, "
+        "or their step, time: {step: 1 ms} or {rate: 1000 Hz}",
     ]
     in_header = "{y: {column: 'y [mA]', time: {column: t, unit: s}}}"
     recording = import_recording(content, put(tmp_path / "m.yaml", map_of(time="-", channels=in_header)))
     assert (recording.channels["y"].values.tolist(), recording.channels["y"].unit) == ([1.0, 2.0], "A")
+
+
+@pytest.mark.parametrize("time", ["{step: 0.5 ms}", "{rate: 2 kHz}"])
+def test_a_log_of_a_fixed_rate_needs_no_column_of_times(time: str, tmp_path: Path) -> None:
+    """Its rows are so far apart; a switch that is logged beside them is 1 or 0."""
+    log = put(tmp_path / "a.csv", "x,enabled\n0.1,FALSE\n0.2,TRUE\n0.3,TRUE\n")
+    channels = "{x: {column: x, unit: A}, enabled: {column: enabled, unit: '1'}}"
+    recording = import_recording(log, put(tmp_path / "m.yaml", map_of(time=time, channels=channels)))
+    assert recording.channels["x"].time == pytest.approx([0.0, 5e-4, 1e-3])
+    assert recording.channels["enabled"].values.tolist() == [0.0, 1.0, 1.0]
+    assert {item.clock for item in recording.channels.values()} == {"time"}
+
+
+@pytest.mark.parametrize(
+    ("time", "told"),
+    [
+        ("{step: 1 A}", "time.step: step is '1 A'; a time, such as 1 ms"),
+        ("{rate: -2 Hz}", "time.rate: rate is '-2 Hz'; a frequency, such as 1000 Hz"),
+        ("{rate: fast}", "time.rate: "),
+        ("{step: 1 ms, unit: s}", "time: 'unit' stands beside step; step alone, or a column of times"),
+    ],
+)
+def test_a_step_that_is_none_is_told(time: str, told: str, tmp_path: Path) -> None:
+    """With what there may be."""
+    with pytest.raises(FrictionOcpError) as caught:
+        load_import_map(put(tmp_path / "m.yaml", map_of(time=time, channels="{x: {column: x, unit: A}}")))
+    (finding,) = caught.value.findings
+    assert str(finding).partition("m.yaml: ")[2].startswith(told)
 
 
 def test_other_formats_and_missing_files_are_told(tmp_path: Path) -> None:
