@@ -97,9 +97,9 @@ class Diagnosis:
 
         They take no part in choosing; but what helps where it was fitted alone explains nothing. Where only a stated
         value was wrong, and the innovations showed no gap, there is none to shrink; where noise alone makes free runs
-        `stray` as far, they contradict nothing. Nor do they then excuse a slow torque that is left.
+        `stray` as far, they contradict nothing.
         """
-        return self._comes_closer or (self.stray and not significant(self.slow, self.level))
+        return self._comes_closer or self.stray
 
     @cached_property
     def _comes_closer(self) -> bool:

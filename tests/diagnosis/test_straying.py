@@ -13,9 +13,7 @@ from diagnosis_cases import axis, diagnosed, with_stribeck, write_case
 
 from friction_ocp.diagnosis import straying
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import free_errors
-from friction_ocp.diagnosis.slow_torque import SlowTorque
 from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.estimation.model import prepare
 from friction_ocp.estimation.score import simulate_recordings
@@ -84,12 +82,3 @@ def test_friction_by_direction_of_a_telescope_is_found_though_its_free_runs_part
     assert values[f"{stem}.viscous.positive"] == pytest.approx(odd["viscous"], rel=0.1)
     for name in ("omega_s", "sigma0"):
         assert values[f"{stem}.{SHARES[name]}.positive"] == pytest.approx(odd[name] / mean[name], abs=0.03)
-
-
-@pytest.mark.parametrize(("chance", "excused"), [(0.3, True), (1e-9, False)])
-def test_runs_that_stray_excuse_no_slow_torque_that_is_left(chance: float, excused: bool) -> None:
-    """They say nothing of it, and short errors hide it: what a model leaves of it is all that tells it is unknown."""
-    found = object.__new__(Diagnosis)
-    slow = (SlowTorque("load", 22.0, chance), SlowTorque("motor", 0.4, 1.0))
-    found.__dict__.update(_comes_closer=False, stray=True, slow=slow, level=LEVEL)
-    assert found.carries_over is excused
