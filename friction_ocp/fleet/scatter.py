@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
+from friction_ocp.estimation.uncertainty import reach95
 from friction_ocp.simulation.grid import BoolArray, FloatArray
-
-stats: Any = _stats  # its own types are incomplete
 
 _MOST_STEPS, _ENOUGH = 100, 1e-9
 _EXACT = 1e-9
@@ -40,7 +37,7 @@ class Level:
         """Return the interval of one coefficient; None where no estimate is left over to tell it by."""
         if self.freedom < 1:
             return None
-        half = float(stats.t.ppf(0.975, self.freedom)) * float(np.sqrt(self.covariance[column, column]))
+        half = reach95(self.freedom) * float(np.sqrt(self.covariance[column, column]))
         middle = float(self.coefficients[column])
         return middle - half, middle + half
 

@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording.import_map import children, mapping_nodes, repeated_keys
 
 MAX_BYTES = 5_000_000
 MAX_NODES = 200_000
@@ -132,12 +133,6 @@ def _read_text(path: Path) -> str:
         raise FrictionOcpError(Finding(where, what, "a YAML file in UTF-8")) from error
 
 
-def _children(node: yaml.Node) -> list[yaml.Node]:
-    if isinstance(node, yaml.MappingNode):
-        return [item for pair in node.value for item in pair]
-    return list(node.value) if isinstance(node, yaml.SequenceNode) else []
-
-
 def _refuse_explosion(root: yaml.Node, where: str) -> None:
     """Count the nodes that the aliases stand for, without making them."""
     sizes: dict[int, int] = {}
@@ -148,7 +143,7 @@ def _refuse_explosion(root: yaml.Node, where: str) -> None:
             raise FrictionOcpError(Finding(where, "an alias contains itself", remedy="write its content out"))
         if id(node) not in sizes:
             under_way.add(id(node))
-            sizes[id(node)] = 1 + sum(size(child) for child in _children(node))
+            sizes[id(node)] = 1 + sum(size(child) for child in children(node))
             under_way.discard(id(node))
         return sizes[id(node)]
 
@@ -159,32 +154,18 @@ def _refuse_explosion(root: yaml.Node, where: str) -> None:
 
 def _faulty_keys(root: yaml.Node, where: str) -> list[Finding]:
     """Find keys that stand twice in a mapping, or that are not text; keys that look like numbers become text."""
-    findings: list[Finding] = []
-    seen: set[int] = set()
-    todo = [root]
-    while todo:
-        node = todo.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        todo += reversed(_children(node))
-        if isinstance(node, yaml.MappingNode):
-            findings += _faults_of_mapping(node, where)
-    return findings
+    return [item for node in mapping_nodes(root) for item in _faults_of_mapping(node, where)]
 
 
 def _faults_of_mapping(node: yaml.MappingNode, where: str) -> list[Finding]:
     findings: list[Finding] = []
-    first_line: dict[str, int] = {}
+    names: list[yaml.Node] = []
     for key, _ in node.value:
-        line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
+            line = key.start_mark.line + 1
             findings.append(Finding(f"{where}: line {line}", "a key is a list or a mapping", "keys are names"))
             continue
         if key.tag != _MERGE:
             key.tag = _TEXT
-        if key.value in first_line:
-            what = f"key '{key.value}' stands here again, first in line {first_line[key.value]}"
-            findings.append(Finding(f"{where}: line {line}", what, remedy="keep one of them"))
-        first_line.setdefault(key.value, line)
-    return findings
+        names.append(key)
+    return findings + repeated_keys(names, where)

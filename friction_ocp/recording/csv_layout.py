@@ -16,6 +16,7 @@ from friction_ocp.recording.header_unit import header_unit
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
+UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None =
 def _encoding(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(65_536)
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if head.startswith(UTF16_MARKS):
         return "utf-16"
     try:
         head[: head.rfind(b"\n") + 1].decode("utf-8")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -110,24 +110,35 @@ def _refuse_monsters(text: str, where: str) -> None:
 
 def _refuse_repeated_keys(root: yaml.Node | None, where: str) -> None:
     """Refuse keys that stand twice in a mapping: YAML would keep the last of them alone."""
-    findings: list[Finding] = []
-    seen: set[int] = set()
-    todo = [] if root is None else [root]
-    while todo:
-        node = todo.pop()
-        if id(node) in seen or not isinstance(node, yaml.CollectionNode):
-            continue
-        seen.add(id(node))
-        if isinstance(node, yaml.MappingNode):
-            findings += _repeated_keys([key for key, _ in node.value], where)
-            todo += [value for _, value in reversed(node.value)]
-        else:
-            todo += reversed(node.value)
+    mappings = () if root is None else mapping_nodes(root)
+    findings = [item for node in mappings for item in repeated_keys([key for key, _ in node.value], where)]
     if findings:
         raise FrictionOcpError(findings)
 
 
-def _repeated_keys(keys: Sequence[yaml.Node], where: str) -> list[Finding]:
+def mapping_nodes(root: yaml.Node) -> Iterator[yaml.MappingNode]:
+    """Yield every mapping of a document once, outer ones before those in them."""
+    seen: set[int] = set()
+    todo = [root]
+    while todo:
+        node = todo.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        todo += reversed(children(node))
+        if isinstance(node, yaml.MappingNode):
+            yield node
+
+
+def children(node: yaml.Node) -> list[yaml.Node]:
+    """Return the keys and values of a mapping in their order, or the items of a list."""
+    if isinstance(node, yaml.MappingNode):
+        return [item for pair in node.value for item in pair]
+    return list(node.value) if isinstance(node, yaml.SequenceNode) else []
+
+
+def repeated_keys(keys: Sequence[yaml.Node], where: str) -> list[Finding]:
+    """Return a finding for every key of a mapping that stands there before."""
     findings: list[Finding] = []
     first_line: dict[str, int] = {}
     for key in keys:

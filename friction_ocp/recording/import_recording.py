@@ -10,6 +10,7 @@ from pathlib import Path
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv import open_csv
+from friction_ocp.recording.csv_layout import UTF16_MARKS
 from friction_ocp.recording.foreign import ForeignFile, Opener
 from friction_ocp.recording.import_map import load_import_map
 from friction_ocp.recording.json_log import open_json
@@ -50,7 +51,7 @@ READERS: Mapping[str, Opener] = {
     ".asc": open_csv,
 }
 """Reader by the suffix of the file; a further format is a further line."""
-_HEAD, _UTF16 = 4096, (b"\xff\xfe", b"\xfe\xff")
+_HEAD = 4096
 _OF_BYTES = b"\0"
 """What is in the first bytes of every measurement file, whose sizes are numbers of fixed length, and in no text."""
 
@@ -110,7 +111,7 @@ def _is_text(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         head = file.read(_HEAD)
-    return head.startswith(_UTF16) or (bool(head) and _OF_BYTES not in head)
+    return head.startswith(UTF16_MARKS) or (bool(head) and _OF_BYTES not in head)
 
 
 def _refuse_missing(path: Path) -> None:

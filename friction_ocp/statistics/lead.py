@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.estimate import Estimate
-from friction_ocp.estimation.uncertainty import CONFIDENCE
+from friction_ocp.estimation.uncertainty import reach95
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.statistics.block_length import effective_size
 from friction_ocp.statistics.scores import held_out_densities
-
-stats: Any = _stats  # its own types are incomplete
 
 
 @dataclass(frozen=True)
@@ -46,8 +42,7 @@ def held_out_lead(best: Estimate, other: Estimate, sizes: Mapping[str, float]) -
     ]
     std_error = float(np.sqrt(sum(_variance(lead, count) for lead, count in zip(leads, counts, strict=True))))
     freedom = max(1.0, sum(counts) - len(counts))
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
-    return Lead(float(sum(np.sum(lead) for lead in leads)), reach * std_error)
+    return Lead(float(sum(np.sum(lead) for lead in leads)), reach95(freedom) * std_error)
 
 
 def _variance(lead: FloatArray, independent: float) -> float:
