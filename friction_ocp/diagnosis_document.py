@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.diagnosis.additions import with_additions
 from friction_ocp.diagnosis.bias import Bias, biased_parameters
 from friction_ocp.diagnosis.blind_spots import BlindSpot
 from friction_ocp.diagnosis.carried import carried
@@ -19,7 +20,7 @@ from friction_ocp.diagnosis.free_gap import FreeErrors, gap_map
 from friction_ocp.diagnosis.locate import Shape, shape
 from friction_ocp.diagnosis.loop import opened
 from friction_ocp.diagnosis.options import AT, considered
-from friction_ocp.diagnosis.reading import corrections, with_additions
+from friction_ocp.diagnosis.reading import corrections
 from friction_ocp.diagnosis.rival import Rival
 from friction_ocp.diagnosis.select import gave_shape, probabilities
 from friction_ocp.diagnosis.worth import innovations, samples

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from friction_ocp.diagnosis.additions import forms_of
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Tell, open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
@@ -207,7 +208,8 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     tell("the inputs read the other way", 0.0)
     final, accepted, left = stated.final, stated.accepted, stated.left_over
     others = readings.fitted(stated.base)
-    able = [pair for pair in others if explains_more(pair[1], stated.base, final, accepted, left)]
+    forms = forms_of(stated.rounds)
+    able = [pair for pair in others if explains_more(pair[1], stated.base, final, accepted, forms, left)]
     if not able:
         return stated
     other, _ = min(able, key=lambda pair: innovations(pair[1]).ratio)

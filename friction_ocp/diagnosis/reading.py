@@ -7,22 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.additions import Forms, with_additions
 from friction_ocp.diagnosis.excess import DOUBTED
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.kinks import freed
-from friction_ocp.diagnosis.options import released
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import OF_REST, innovations
 from friction_ocp.drive.parts import Channel, Drive
-from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import Clues, Key
-from friction_ocp.effects.registry import effects
+from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.horizon import judged_alike
 from friction_ocp.estimation.model import Model, late_of, prepare, with_drive, with_late
 from friction_ocp.estimation.problem import Problem
-from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
 _DRIVING = ("current", "current_command", "torque", "voltage")
@@ -80,27 +76,34 @@ def _begun_at(known: FittedModel, model: Model, foot: Footing, theta: FloatArray
 
 
 def explains_more(
-    base: FittedModel, stated: FittedModel, final: FittedModel, accepted: Sequence[Key], left_over: bool
+    base: FittedModel,
+    stated: FittedModel,
+    final: FittedModel,
+    accepted: Sequence[Key],
+    forms: Forms,
+    left_over: bool,
 ) -> bool:
     """Whether another reading of the inputs, whose base model this is, does what an addition does or takes the rest.
 
     Or where more than noise is left, does more than one of the additions to the `stated` base model did in its turn:
-    they may stand in for it.
+    they may stand in for it. Additions have the `forms` in which they were accepted.
     """
     left = innovations(final)
     if not accepted:
-        return left_over and _ratio_with(base, (), final) - 1.0 < (1.0 - OF_REST) * left.beyond
-    but_last = _ratio_with(base, accepted[:-1], final)
+        return left_over and innovations(base).ratio - 1.0 < (1.0 - OF_REST) * left.beyond
+    but_last = _ratio_with(base, accepted[:-1], final, forms)
     fewer = ([other for other in accepted if other != key] for key in accepted[:-1])
     enough = left.ratio * DOUBTED
-    if but_last <= enough or any(_ratio_with(base, keys, final) <= enough for keys in fewer):
+    if but_last <= enough or any(_ratio_with(base, keys, final, forms) <= enough for keys in fewer):
         return True
     if not left_over:
         return False
     if but_last < left.ratio or _ratio_as(base, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
         return True
-    turns = range(len(accepted) - 1)
-    return any(_ratio_with(base, accepted[:k], final) < _ratio_with(stated, accepted[: k + 1], final) for k in turns)
+    return any(
+        _ratio_with(base, accepted[:k], final, forms) < _ratio_with(stated, accepted[: k + 1], final, forms)
+        for k in range(len(accepted) - 1)
+    )
 
 
 def leaves_less(read: FittedModel, stated: FittedModel, fewer: bool) -> bool:
@@ -121,12 +124,12 @@ def is_needless(stated: FittedModel, final: FittedModel) -> bool:
     return _ratio_as(stated, final) <= DOUBTED * innovations(final).ratio
 
 
-def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel) -> float:
+def _ratio_with(base: FittedModel, keys: Sequence[Key], final: FittedModel, forms: Forms) -> float:
     """Return the power of the innovations of a base model with some additions, fitted from where they were before.
 
     Infinite where its simulation breaks down there.
     """
-    return _ratio_of(base, with_additions(base, keys), final) if keys else innovations(base).ratio
+    return _ratio_of(base, with_additions(base, keys, forms), final) if keys else innovations(base).ratio
 
 
 def _ratio_as(base: FittedModel, final: FittedModel) -> float:
@@ -141,29 +144,3 @@ def _ratio_of(base: FittedModel, drive: Drive, final: FittedModel) -> float:
     known = {**base.values, **final.values}
     fitted = _begun_at(base, model, base.footing, model.space.clip(model.space.with_known(known)))
     return innovations(fitted).ratio if fitted.holds else np.inf
-
-
-def with_additions(base: FittedModel, keys: Sequence[Key]) -> Drive:
-    """Return the drive of the base model with some effects, as they would be added in this order.
-
-    What is named again gets a more general shape.
-    Values that were taken back are no part of it: they are fitted in the base model already.
-    """
-    drive, clues, there = base.model.problem.drive, clues_of(base), set[Key]()
-    for effect, place in keys:
-        kind = effects()[effect]
-        if (effect, place) in there:
-            shape = kind.reshaped(drive, place, clues)
-            drive = drive if shape is None else shape.drive
-        elif place in kind.places(drive) or (place in drive.prescribed and place in kind.places(released(drive))):
-            drive = kind.augment(drive, place, clues).drive
-            there.add((effect, place))
-        clues = _seeing(clues, drive)
-    return drive
-
-
-def _seeing(clues: Clues, drive: Drive) -> Clues:
-    """Return clues that know what was added to a drive: at its guess."""
-    free = {leaf.path: leaf.value.guess for leaf in drive_leaves(drive) if isinstance(leaf.value, Free)}
-    added = {path: guess for path, guess in free.items() if path not in clues.numbers}
-    return replace(clues, numbers={**clues.numbers, **added}) if added else clues

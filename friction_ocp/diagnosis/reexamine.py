@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from friction_ocp.diagnosis.additions import forms_of, with_additions
 from friction_ocp.diagnosis.bench import Bench, point_document, seated, value_of
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.clues import clues_of
@@ -17,7 +18,6 @@ from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.led_back import led_back
 from friction_ocp.diagnosis.polishing import loosely, polished, timed
-from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_another, is_same
 from friction_ocp.diagnosis.select import Round, choose, gave_shape, turned
@@ -50,21 +50,32 @@ def gone_back(bench: Bench, extended: FittedModel, first: bool) -> Bench | None:
 
 
 def without_superfluous(
-    bench: Bench, accepted: list[Key], level: float, rng: np.random.Generator, run: Execution, latest: bool = True
+    bench: Bench,
+    rounds: Sequence[Round],
+    accepted: list[Key],
+    level: float,
+    rng: np.random.Generator,
+    run: Execution,
+    latest: bool = True,
 ) -> tuple[FittedModel, list[Key]]:
     """Drop earlier additions that the `latest` one, which stays, has made superfluous on recordings left out.
 
     Superfluous is what neither gains for certain there nor is worth an addition in sum; beside what leaves no more than
     noise, what is not worth its parameters. Where none is the latest, one stays.
     """
-    current, benchmark = bench.current, Benchmark(bench.current)
+    current, benchmark, forms = bench.current, Benchmark(bench.current), forms_of(rounds)
     earlier = list(dict.fromkeys(accepted[:-1] if latest else accepted))
-    known = _fits(bench, run, {key: _Wanted(_less(accepted, key)) for key in earlier})
+    known = _fits(
+        bench, run, {key: _Wanted(with_additions(bench.base, _less(accepted, key), forms)) for key in earlier}
+    )
     for key in earlier:
         kept = _less(accepted, key)
         if not kept and not latest:
             break
-        simpler = known[key] if current is bench.current else without_addition(current, _drive(bench, kept))
+        if current is bench.current:
+            simpler = known[key]
+        else:
+            simpler = without_addition(current, with_additions(bench.base, kept, forms))
         if simpler is None or not simpler.holds:
             continue
         gains = benchmark.dearer(simpler)
@@ -74,7 +85,7 @@ def without_superfluous(
     return current, accepted
 
 
-def without_small(bench: Bench, accepted: list[Key]) -> tuple[FittedModel, list[Key]]:
+def without_small(bench: Bench, rounds: Sequence[Round], accepted: list[Key]) -> tuple[FittedModel, list[Key]]:
     """Drop additions, the latest first, without which little more of the whole gap is left; one stays.
 
     For where more than noise is left at the end, though all was tried. A small addition is one for what it does to
@@ -82,11 +93,11 @@ def without_small(bench: Bench, accepted: list[Key]) -> tuple[FittedModel, list[
     without it stays. Beside something unknown the rest is what stand-ins for it leave, whose shape is not quite
     that of the machine, and what explains a part of that is no further effect.
     """
-    current = bench.current
+    current, forms = bench.current, forms_of(rounds)
     least = OF_ALL * (bench.base.cost - 0.5 * samples(bench.base))
     for key in reversed(dict.fromkeys(accepted)):
         kept = _less(accepted, key)
-        simpler = without_addition(current, _drive(bench, kept)) if kept else None
+        simpler = without_addition(current, with_additions(bench.base, kept, forms)) if kept else None
         if simpler is None or not simpler.holds:
             continue
         if simpler.cost - current.cost < min(least, ALMOST * (simpler.cost - 0.5 * samples(simpler))):
@@ -117,7 +128,8 @@ def exchanged(
         if held is not None and _is_open(done, index, accepted):
             for rival in _others(bench, item, accepted):
                 keys = _swapped(accepted, held.key, rival.key)
-                wanted[held.key, rival.key] = _Wanted(keys, rival.standing.values)
+                drive = with_additions(bench.base, keys, forms_of(rounds, {held.key: rival.key}))
+                wanted[held.key, rival.key] = _Wanted(drive, rival.standing.values)
     known = _fits(bench, run, wanted)
     for index, item in enumerate(done[:-1]):
         held = item.accepted
@@ -134,7 +146,8 @@ def exchanged(
             elif exhausted():
                 break
             else:
-                swapped = _fitted(bench, current, keys, rival.standing.values)
+                drive = with_additions(bench.base, keys, forms_of(done, {held.key: rival.key}))
+                swapped = _fitted(bench, current, drive, rival.standing.values)
             if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
                 continue
             gains = -benchmark.dearer(swapped)
@@ -158,7 +171,7 @@ def exchanged(
 class _Wanted:
     """Additions to fit together: what is left of the current ones, or them with one exchanged."""
 
-    keys: list[Key]
+    drive: Drive
     alone: Mapping[str, float] | None = None
     """Where the one that is exchanged ended by itself."""
 
@@ -188,10 +201,6 @@ def _swapped(accepted: Sequence[Key], held: Key, rival: Key) -> list[Key]:
     return [rival if k == first else other for k, other in enumerate(accepted) if k == first or other != held]
 
 
-def _drive(bench: Bench, keys: Sequence[Key]) -> Drive:
-    return with_additions(bench.base, keys)
-
-
 Name = TypeVar("Name", bound=Hashable)
 
 
@@ -201,7 +210,7 @@ def _fits(bench: Bench, run: Execution, wanted: Mapping[Name, _Wanted]) -> dict[
     They are set up again when they are looked at, which all of them are.
     """
     tasks = {
-        name: Task(f"instead-{k}", fit_instead, (tuple(item.keys), item.alone))
+        name: Task(f"instead-{k}", fit_instead, (item.drive, item.alone))
         for k, (name, item) in enumerate(wanted.items())
     }
     if not tasks:
@@ -212,17 +221,15 @@ def _fits(bench: Bench, run: Execution, wanted: Mapping[Name, _Wanted]) -> dict[
     found = dict[Name, FittedModel | None]()
     for name, item in wanted.items():
         point = value_of(outcomes[tasks[name].key])
-        model = with_drive(bench.base.model, _drive(bench, item.keys))
+        model = with_drive(bench.base.model, item.drive)
         found[name] = None if point is None else seated(model, bench.base.footing, point)
     return found
 
 
-def fit_instead(bench: Bench, keys: Sequence[Key], alone: Mapping[str, float] | None) -> Json:
-    """Fit other additions than those of the bench; the value says where, null where the simulation breaks down."""
-    if alone is None:
-        fitted = without_addition(bench.current, _drive(bench, keys))
-    else:
-        fitted = _fitted(bench, bench.current, keys, alone)
+def fit_instead(bench: Bench, drive: Drive, alone: Mapping[str, float] | None) -> Json:
+    """Fit a drive with other additions than the bench; the value says where, null where the simulation breaks down."""
+    current = bench.current
+    fitted = without_addition(current, drive) if alone is None else _fitted(bench, current, drive, alone)
     return point_document(fitted) if fitted.holds else None
 
 
@@ -237,7 +244,7 @@ def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection
     own = item.accepted.key
 
     def open_to(key: Key) -> bool:
-        return key not in accepted or may_grow(_drive(bench, [key]), key, clues_of(bench.base))
+        return key not in accepted or may_grow(with_additions(bench.base, [key]), key, clues_of(bench.base))
 
     others = [rival for rival in item.choice.rivals if rival.key not in {own, *seen} and open_to(rival.key)]
     others = sorted(others, key=lambda rival: rival.standing.cost)
@@ -247,12 +254,12 @@ def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection
     return others[:TRIED] + [rival for rival in simpler if rival.standing.cost <= most][:TRIED]
 
 
-def _fitted(bench: Bench, current: FittedModel, keys: Sequence[Key], alone: Mapping[str, float]) -> FittedModel:
-    """Fit the base model with some additions, from where one of them ended by itself and what the others are now.
+def _fitted(bench: Bench, current: FittedModel, drive: Drive, alone: Mapping[str, float]) -> FittedModel:
+    """Fit a drive with some additions, from where one of them ended by itself and what the others are now.
 
     Or from where all but that one are now, if that is nearer, or from where loosely joined segments lead free runs.
     """
-    model = with_drive(bench.base.model, _drive(bench, keys))
+    model = with_drive(bench.base.model, drive)
     starts = [{**current.values, **alone}, {**alone, **current.values}]
     begins = [model.space.with_known(known) for known in starts]
     if bench.base.footing.segment_s is None:

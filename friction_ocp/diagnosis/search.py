@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from friction_ocp.diagnosis.additions import forms_of, with_additions
 from friction_ocp.diagnosis.allowance import measured_out
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import Bench, Tell, bettered, on_shorter_steps, opened_better, sharpened
@@ -20,7 +21,6 @@ from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.left_out import LeftOut
 from friction_ocp.diagnosis.options import NONE, Considered, places
-from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.diagnosis.reexamine import exchanged, gone_back, without_small, without_superfluous
 from friction_ocp.diagnosis.refit import MOST_OF, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_same
@@ -102,7 +102,7 @@ class Search:
             return
         unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
         if unknown and len(set(self.accepted)) > 1:
-            current, self.accepted = without_small(self.bench, self.accepted)
+            current, self.accepted = without_small(self.bench, self.rounds, self.accepted)
             self.bench = self.bench.at(current)
         if self.accepted and not self._left_out.helps(self.bench, self.level):
             self._withdraw()
@@ -265,7 +265,7 @@ class Search:
             if self._allowance.exhausted():
                 break
             kept = [key for key in self.accepted if key != held.key]
-            simpler = without_addition(current, with_additions(base, kept))
+            simpler = without_addition(current, with_additions(base, kept, forms_of(self.rounds)))
             if not simpler.holds:
                 continue
             bench = self.bench.at(simpler)
@@ -280,7 +280,7 @@ class Search:
         """Add what a round has found; drop or exchange earlier additions that it makes superfluous."""
         self.tell("examining earlier additions again", 0.0)
         bench, keys = self._with(rival), [*self.accepted, rival.key]
-        current, self.accepted = without_superfluous(bench, keys, self.level, self.rng, self.run)
+        current, self.accepted = without_superfluous(bench, self.rounds, keys, self.level, self.rng, self.run)
         self.bench = on_shorter_steps(bench.at(current), SEARCHING)
         if innovations(self.bench.current).significant(self.level) and not self._allowance.exhausted():
             self._exchange()
@@ -299,7 +299,7 @@ class Search:
         if bench is self.bench:
             return
         if len(set(self.accepted)) > 1:
-            found = without_superfluous(bench, self.accepted, self.level, self.rng, self.run, latest=False)
+            found = without_superfluous(bench, self.rounds, self.accepted, self.level, self.rng, self.run, latest=False)
             bench, self.accepted = bench.at(found[0]), found[1]
         self.bench, self._fitted_base = bench, base
 
@@ -321,7 +321,9 @@ class Search:
                 break
             self.bench, self.rounds = self.bench.at(done.accepted.fitted), [*self.rounds, done]
             self.accepted = [*self.accepted, done.accepted.key]
-            current, self.accepted = without_superfluous(self.bench, self.accepted, self.level, self.rng, self.run)
+            current, self.accepted = without_superfluous(
+                self.bench, self.rounds, self.accepted, self.level, self.rng, self.run
+            )
             self.bench = self.bench.at(current)
         if len(set(self.accepted)) > 1:
             self.tell("weighing rivals of earlier additions again", 0.0)

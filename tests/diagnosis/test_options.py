@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from diagnosis_cases import axis, write_case
 
+from friction_ocp.diagnosis.additions import with_additions
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.diagnosis.options import considered, effort_of, level_of, places
-from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.effects.registry import effects
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.estimation.model import prepare

@@ -11,8 +11,8 @@ import yaml
 from diagnosis_cases import ENCODER_STEP, STEP, axis, diagnosed, record, write_case
 from plant import Plant, PlantFriction, PlantSensor, PlantShaft, PlantTransmission
 
+from friction_ocp.diagnosis.additions import with_additions
 from friction_ocp.diagnosis.base_fit import fit_base
-from friction_ocp.diagnosis.reading import with_additions
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.effects.effect import Clues, Missing, Track
 from friction_ocp.effects.registry import effects

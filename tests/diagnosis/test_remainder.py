@@ -43,7 +43,7 @@ def fitted(keys: tuple[Key, ...]) -> Any:
 def kept(monkeypatch: pytest.MonkeyPatch, *keys: Key) -> list[Key]:
     """Return what stands of additions; a drive is what was added to it."""
 
-    def with_additions(base: Any, some: list[Key]) -> tuple[Key, ...]:
+    def with_additions(base: Any, some: list[Key], forms: Any) -> tuple[Key, ...]:
         return tuple(some)
 
     def without_addition(current: Any, drive: tuple[Key, ...]) -> Any:
@@ -52,7 +52,7 @@ def kept(monkeypatch: pytest.MonkeyPatch, *keys: Key) -> list[Key]:
     monkeypatch.setattr(reexamine, "with_additions", with_additions)
     monkeypatch.setattr(reexamine, "without_addition", without_addition)
     bench = cast(Bench, SimpleNamespace(base=fitted(()), current=fitted(keys)))
-    current, accepted = without_small(bench, list(keys))
+    current, accepted = without_small(bench, [], list(keys))
     assert cast(Any, current).keys == tuple(accepted)
     return accepted
 
