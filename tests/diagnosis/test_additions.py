@@ -33,7 +33,11 @@ def test_a_wave_keeps_the_phases_that_it_was_accepted_with(tmp_path: Path, monke
     typical = {"motor": 1.0}
     alike, apart = (Clues(tracks(each), {}, typical) for each in ((0.4, 0.4, 0.4), (0.4, 2.0, 4.0)))
     seen = {id(base): alike, id(beside): apart}
-    monkeypatch.setattr(additions, "clues_of", lambda fitted: seen[id(fitted)])
+
+    def clues_of(fitted: Any) -> Clues:
+        return seen[id(fitted)]
+
+    monkeypatch.setattr(additions, "clues_of", clues_of)
     rounds = [accepting(FIRST, base), accepting(WAVE, beside)]
 
     def phases(keys: list[Key], forms: additions.Forms | None) -> bool:
@@ -48,7 +52,11 @@ def test_a_wave_keeps_the_phases_that_it_was_accepted_with(tmp_path: Path, monke
 
 def test_every_shape_has_the_form_of_its_round(monkeypatch: pytest.MonkeyPatch) -> None:
     """What takes the place of another takes its rounds."""
-    monkeypatch.setattr(additions, "clues_of", lambda fitted: fitted)
+
+    def named(fitted: Any) -> Any:
+        return fitted
+
+    monkeypatch.setattr(additions, "clues_of", named)
     rounds = [accepting(WAVE, "base"), accepting(FIRST, "second"), accepting(WAVE, "third")]
     assert forms_of(rounds) == {WAVE: ["base", "third"], FIRST: ["second"]}
     assert forms_of(rounds, {WAVE: OTHER}) == {OTHER: ["base", "third"], FIRST: ["second"]}
