@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from friction_ocp.diagnosis.bench import Tell
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.execution.effort import Limit, effort
 
+Tell = Callable[[str, float], None]
+"""Called with what is being done and the share of a round that is done."""
 LONG = 300.0
 """Seconds from which it is told beforehand how long a search may take."""
 MOST_STEPS, MOST_RUNS = 2e9, 2900.0
@@ -16,6 +18,8 @@ MOST_STEPS, MOST_RUNS = 2e9, 2900.0
 which nothing further is tried: about two minutes on two processors, and longer for logs of more than 130,000 steps."""
 LEAST = 0.05
 """Share of it that each way around the kinks of a fit may take, whatever is left."""
+OF_BASE = 0.2
+"""The same of the base model, on whose end all depends."""
 
 
 @dataclass
@@ -48,13 +52,28 @@ class Allowance:
 
 def measured_out(base: FittedModel, patience: float, tell: Tell) -> Allowance:
     """Return what a search from a base model may take, `patience` times the usual; tell how long that is if it is."""
-    before, began = effort(), time.perf_counter()
-    base.linear.program.linearise(base.linear.point)
-    first, took = effort(), time.perf_counter() - began
-    once = first - before
-    most = patience * max(MOST_STEPS, MOST_RUNS * once)
+    began = time.perf_counter()
+    once = _once(base)
+    took = time.perf_counter() - began
+    most = patience * _usual(once)
     longest = took * most / max(once, 1.0)
     if longest > LONG:
         shorter = "`effort` or `samples` under `diagnosis:`, or `from` and `to` beside a file, make it shorter"
         tell(f"the search may take about {longest / 60.0:.0f} min on one processor; {shorter}", 0.0)
-    return Allowance(first, most)
+    return Allowance(effort(), most)
+
+
+def of_base(fitted: FittedModel) -> Limit:
+    """Return what each way around the kinks of a base model may take."""
+    return Limit(0.0, OF_BASE * _usual(_once(fitted)))
+
+
+def _usual(once: float) -> float:
+    return max(MOST_STEPS, MOST_RUNS * once)
+
+
+def _once(fitted: FittedModel) -> float:
+    """Return the effort of a simulation with derivatives."""
+    before = effort()
+    fitted.linear.program.linearise(fitted.linear.point)
+    return effort() - before

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from friction_ocp.diagnosis.allowance import of_base
 from friction_ocp.diagnosis.easing import along, eased, finer
 from friction_ocp.diagnosis.excerpts import excerpts
 from friction_ocp.diagnosis.finer_steps import SEARCHING, on_short_steps
@@ -27,6 +28,7 @@ from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import WIDTHS, mean_error, predictions
 from friction_ocp.estimation.standstill import at_rest
+from friction_ocp.execution.effort import limited
 from friction_ocp.simulation.grid import FloatArray
 from friction_ocp.simulation.losses import Absolute
 
@@ -71,7 +73,8 @@ def _fitted_base(model: Model) -> FittedModel:
         if noise_moved(fitted.linear.program, model, fitted.footing, _plausible(model, fitted.theta)) < RELAID:
             break
         fitted = _joined(model, _laid(model, fitted.theta), fitted.theta, None)
-    return fitted_sharply(fitted, model.space.guess)
+    with limited(of_base(fitted)):
+        return fitted_sharply(fitted, model.space.guess)
 
 
 def _laid(model: Model, theta: FloatArray) -> Footing:
@@ -97,7 +100,8 @@ def _plausible(model: Model, theta: FloatArray) -> FloatArray:
 def _joined(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:
     """Fit segments that torque noise joins, as a footing lays them, from a start."""
     started = polished(model, foot, theta, nodes)
-    return freed(timed(_from_rest(_from_afar(started, [model.space.guess, theta]))))
+    with limited(of_base(started)):
+        return freed(timed(_from_rest(_from_afar(started, [model.space.guess, theta]))))
 
 
 def predicting(fitted: FittedModel) -> FittedModel:
@@ -129,7 +133,9 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
     starts = [model.space.guess, _rough_answer(model)[1].theta]
     best = min((_coarse(model, rough, theta) for theta in starts), key=lambda end: end.objective)
     foot = footing(model, best.theta)
-    return freed(timed(_from_rest(polished(model, foot, best.theta, best.linear.point.nodes))))
+    started = polished(model, foot, best.theta, best.linear.point.nodes)
+    with limited(of_base(started)):
+        return freed(timed(_from_rest(started)))
 
 
 def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -40,8 +39,6 @@ from friction_ocp.simulation.losses import Absolute, Huber, Squares, StudentT
 from friction_ocp.statistics.execution import Execution
 from friction_ocp.statistics.workshop import Workshop
 
-Tell = Callable[[str, float], None]
-"""Called with what is being done and the share of a round that is done."""
 MOST_TURNS = 3
 """How often fits from parameters changed by chance may go on from a better one."""
 LOSSES = (Absolute, Huber, Squares, StudentT)

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from friction_ocp.diagnosis.allowance import Tell
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, point_document, seated, value_of
+from friction_ocp.diagnosis.bench import Bench, point_document, seated, value_of
 from friction_ocp.diagnosis.benchmark import blocks_like
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from friction_ocp.diagnosis.additions import forms_of
+from friction_ocp.diagnosis.allowance import Tell
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Tell, open_bench
+from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
 from friction_ocp.diagnosis.excess import DOUBTED, Excess
@@ -31,6 +32,7 @@ from friction_ocp.effects.effect import Key
 from friction_ocp.effects.stated_values import STATED
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.execution.effort import limited
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.statistics.execution import Execution
@@ -199,7 +201,7 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
     readings, began = OtherReadings(problem), time.perf_counter()
     search = _searched(problem, tell, execution, readings)
     if search.outdone is not None:
-        read = _read_as(search.outdone, problem, tell, execution, search.effort, began)
+        read = _read_as(search.outdone, problem, tell, execution, search.allowance.taken, began)
         needless = is_needless(search.bench.base, read.final)
         return _concluded(problem, _searched(problem, tell, execution), began) if needless else read
     stated = _concluded(problem, search, began)
@@ -248,7 +250,8 @@ def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
     """Return what a search, `began` at that time, comes to."""
     level, meant = search.level, search.meant
     base, rounds, accepted = search.bench.base, search.rounds, search.accepted
-    current, checked = _checked(search.bench.current, base, meant, level)
+    with limited(search.allowance.limit):
+        current, checked = _checked(search.bench.current, base, meant, level)
     ended, left = search.bench.at(current) if checked else search.bench, innovations(current)
     accepted += [item.accepted.key for item in checked if item.accepted is not None]
     stood, superseded = standing(merged(rounds, checked), accepted)
@@ -268,8 +271,8 @@ def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
             slow=ended.slow,
             blind=blind_spots(current, left, ended.clues, meant),
             seconds=time.perf_counter() - began,
-            effort=search.effort,
-            cut_short=search.cut_short,
+            effort=search.allowance.taken,
+            cut_short=search.allowance.spent,
         )
     )
 

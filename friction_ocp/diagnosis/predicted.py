@@ -30,7 +30,7 @@ def led_by_predictions(search: Search, run: Execution) -> Search:
     what they miss, of lost free runs, or more than what was found, fitted to predictions, takes of it. Free runs that
     come back to the recordings with these additions show what predictions cannot, and the search goes on with them.
     """
-    patience = search.patience * max(1.0 - search.effort, FOR_PREDICTIONS)
+    patience = search.patience * max(1.0 - search.allowance.taken, FOR_PREDICTIONS)
     other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
     other.go()
     if not other.accepted or (search.accepted and not _tells_otherwise(search, other)):
@@ -71,7 +71,7 @@ def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | Non
             return None
         bench, rounds = bench.at(done.accepted.fitted), [*rounds, done]
     accepted = [item.accepted.key for item in rounds if item.accepted is not None]
-    patience = search.patience * max(1.0 - search.effort - other.effort, LEAST_SHARE)
+    patience = search.patience * max(1.0 - search.allowance.taken - other.allowance.taken, LEAST_SHARE)
     again = Search(bench, run, search.meant, search.level, search.tell, patience, rounds=rounds, accepted=accepted)
     again.go()
     return again if again.accepted and not again.bench.current.astray else None

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friction_ocp.diagnosis.additions import forms_of, with_additions
-from friction_ocp.diagnosis.allowance import measured_out
+from friction_ocp.diagnosis.allowance import Tell, measured_out
 from friction_ocp.diagnosis.aside import OtherReadings
-from friction_ocp.diagnosis.bench import Bench, Tell, bettered, on_shorter_steps, opened_better, sharpened
+from friction_ocp.diagnosis.bench import Bench, bettered, on_shorter_steps, opened_better, sharpened
 from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
@@ -71,22 +71,12 @@ class Search:
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.bench.problem.estimation.seed)
         self._left_out = LeftOut(self.run)
-        self._allowance = measured_out(self.bench.base, self.patience, self.tell)
+        self.allowance = measured_out(self.bench.base, self.patience, self.tell)
 
     @property
     def fitted_base(self) -> FittedModel:
         """The base model on the footing that it was fitted on, which need not be the one that the search ends on."""
         return self._fitted_base or self.bench.base
-
-    @property
-    def effort(self) -> float:
-        """What the search has taken, over what it may take."""
-        return self._allowance.taken
-
-    @property
-    def cut_short(self) -> bool:
-        """Whether the search ended at its limit of effort, with things left to try."""
-        return self._allowance.spent
 
     @property
     def lost_its_way(self) -> bool:
@@ -96,18 +86,19 @@ class Search:
 
     def go(self) -> None:
         """Add until noise is left, nothing helps or the rounds are used up; then look at all of it again."""
-        with limited(self._allowance.limit):
+        with limited(self.allowance.limit):
             self._add()
         if self.outdone is not None:
             return
-        unknown = not self.cut_short and innovations(self.bench.current).significant(self.level)
+        unknown = not self.allowance.spent and innovations(self.bench.current).significant(self.level)
         if unknown and len(set(self.accepted)) > 1:
             current, self.accepted = without_small(self.bench, self.rounds, self.accepted)
             self.bench = self.bench.at(current)
         if self.accepted and not self._left_out.helps(self.bench, self.level):
             self._withdraw()
         if self.accepted:
-            self._sharpen()
+            with limited(self.allowance.limit):
+                self._sharpen()
             self.bench = on_shorter_steps(self.bench, SHIFT)
 
     def _add(self) -> None:
@@ -132,7 +123,7 @@ class Search:
                 self._settle()
                 if not self._left_out.fall_short(self.bench, self.level):
                     break
-            if self._allowance.exhausted():
+            if self.allowance.exhausted():
                 break
 
     def _seems_missing(self, first: Round) -> bool:
@@ -168,7 +159,7 @@ class Search:
         rival = next(iter(done.choice.rivals), None)
         if rival is None or current.cost - rival.standing.cost < MOST_OF * (current.cost - noise):
             return None
-        if not grows(rival, self.bench.clues) or self._allowance.exhausted():
+        if not grows(rival, self.bench.clues) or self.allowance.exhausted():
             return None
         bench, keys = self.bench.at(rival.fitted), [*self.accepted, rival.key]
         grown = self._round(bench, keys, NONE)
@@ -181,7 +172,7 @@ class Search:
     def _elsewhere(self) -> Round | None:
         """Look for an addition from other models than the current one."""
         for way in (self._from_better, self._from_alias, self._reopened, self._from_rival):
-            done = None if not self.accepted or self._allowance.exhausted() else way()
+            done = None if not self.accepted or self.allowance.exhausted() else way()
             if done is not None:
                 return done
         return None
@@ -216,7 +207,7 @@ class Search:
         for rival in (*last.choice.named, *nearer):
             if rival.key in tried or is_same(rival, last.accepted):
                 continue
-            if self._allowance.exhausted():
+            if self.allowance.exhausted():
                 break
             tried.add(rival.key)
             bench, keys = self._on_steps(rival.fitted), [*before, rival.key]
@@ -241,7 +232,7 @@ class Search:
         tried = {item.key for item in first.choice.named}
         others = [item for item in first.choice.rivals if item.key[0] != held.key[0] and item.key not in tried]
         for rival in sorted(others, key=lambda item: item.standing.cost)[:INSTEAD]:
-            if self._allowance.exhausted():
+            if self.allowance.exhausted():
                 break
             bench = self._on_steps(rival.fitted)
             done = self._round(bench, [rival.key], self.meant)
@@ -262,7 +253,7 @@ class Search:
             held = item.accepted
             if held is None or self.accepted.count(held.key) != 1:
                 continue
-            if self._allowance.exhausted():
+            if self.allowance.exhausted():
                 break
             kept = [key for key in self.accepted if key != held.key]
             simpler = without_addition(current, with_additions(base, kept, forms_of(self.rounds)))
@@ -282,7 +273,7 @@ class Search:
         bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, self.rounds, keys, self.level, self.rng, self.run)
         self.bench = on_shorter_steps(bench.at(current), SEARCHING)
-        if innovations(self.bench.current).significant(self.level) and not self._allowance.exhausted():
+        if innovations(self.bench.current).significant(self.level) and not self.allowance.exhausted():
             self._exchange()
 
     def _with(self, rival: Rival) -> Bench:
@@ -304,7 +295,7 @@ class Search:
         self.bench, self._fitted_base = bench, base
 
     def _exchange(self) -> None:
-        spent = self._allowance.exhausted
+        spent = self.allowance.exhausted
         found = exchanged(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run, spent)
         current, self.rounds, self.accepted = found
         self.bench = self.bench.at(current)
@@ -341,7 +332,7 @@ class Search:
         is_own = [item.accepted is not None and item.accepted.key == held for item in self.rounds]
         own = [item for item, yes in zip(self.rounds, is_own, strict=True) if yes]
         dropped = [item for item, yes in zip(self.rounds, is_own, strict=True) if not yes]
-        current, own = weighed_in_shape(self.bench, own, grown, self._allowance.exhausted, self.level, self.rng)
+        current, own = weighed_in_shape(self.bench, own, grown, self.allowance.exhausted, self.level, self.rng)
         self.bench, self.rounds = self.bench.at(current), [*dropped, *own]
         self.accepted = [item.accepted.key for item in own if item.accepted is not None]
 
@@ -388,7 +379,7 @@ class Search:
         parts = len(folds(current))
         choice = choose([], blocks, parts, level, self.rng)
         asked = {key: -np.inf if key in again else enough for key in known}
-        for rivals in completed_rivals(crew, chosen, unfitted, known, asked, self._allowance.exhausted):
+        for rivals in completed_rivals(crew, chosen, unfitted, known, asked, self.allowance.exhausted):
             able = [item.key in again or (item.standing.material and gain(current, item) >= enough) for item in rivals]
             fit = [item for item, yes in zip(rivals, able, strict=True) if yes]
             choice = choose(fit, blocks, parts, level, self.rng)

@@ -100,7 +100,7 @@ def test_other_effects_are_followed_where_the_only_addition_leads_nowhere(
         meant=None,
         _round=look,
         _on_steps=bench.at,
-        _allowance=SimpleNamespace(exhausted=lambda: False),
+        allowance=SimpleNamespace(exhausted=lambda: False),
     )
     done = Search._from_rival(looking)
     assert looked == [[RIVAL]]
