@@ -28,7 +28,7 @@ from friction_ocp.drive.coordinates import ORDERS
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.units import signal_unit, unit_of
 from friction_ocp.drive.values import drive_leaves
-from friction_ocp.effects.effect import Key, moving_shafts
+from friction_ocp.effects.effect import Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.estimation.horizon import horizon
 from friction_ocp.estimation.noise import NoiseFloor
@@ -292,17 +292,21 @@ def _remainder(diagnosis: Diagnosis) -> dict[str, Any]:
         "ratio": diagnosis.remainder.ratio,
         "ratio_before": innovations(diagnosis.base).ratio,
         "slow_torque": slow,
-        "as_torque_noise": component if _may_be_torque_noise(diagnosis, component) else None,
+        "parted_by_torque": diagnosis.parted_by_torque,
+        **_as_torque_noise(diagnosis),
     }
 
 
-def _may_be_torque_noise(diagnosis: Diagnosis, component: str | None) -> bool:
-    """Whether torque noise on a shaft, of which the file states none, would leave what is left: nothing in one step."""
-    if not diagnosis.unexplained or diagnosis.remainder.significant(diagnosis.level):
-        return False
-    shafts = {shaft.name for shaft in moving_shafts(diagnosis.problem.drive)}
-    stated = diagnosis.problem.estimation
-    return component in shafts - (stated.process_noise.keys() - set(stated.estimated_noise))
+def _as_torque_noise(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the shaft whose torque noise, of which the file states none, may be all that is left, and how much it is.
+
+    None where one-step predictions show more, or where nothing is left.
+    """
+    noise = diagnosis.torque_noise
+    if noise is None or not diagnosis.unexplained or diagnosis.remainder.significant(diagnosis.level):
+        return {"as_torque_noise": None}
+    unit = f"{si_unit('torque', diagnosis.problem.drive.shaft(noise.component).motion)}/sqrt(Hz)"
+    return {"as_torque_noise": noise.component, "torque_noise": {"value": noise.density, "unit": unit}}
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import LinearRecording
+from friction_ocp.drive.gearing import relative_speeds
 from friction_ocp.drive.input_noise import NOISE
 from friction_ocp.drive.mechanism import column
 from friction_ocp.drive.motors import motor_torque
@@ -97,15 +98,8 @@ def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[st
     drive, terms = fitted.model.problem.drive, fitted.model.static
     if not terms:
         return {}
-    found = {drive.shafts[0].name: np.concatenate([term.speed for term in terms])}
-    for _ in drive.transmissions:
-        for item in drive.transmissions:
-            ratio = numbers.get(f"{item.from_shaft}-{item.to_shaft}.ratio", 1.0)
-            if item.from_shaft in found and item.to_shaft not in found:
-                found[item.to_shaft] = found[item.from_shaft] / ratio
-            elif item.to_shaft in found and item.from_shaft not in found:
-                found[item.from_shaft] = found[item.to_shaft] * ratio
-    return found
+    first = np.concatenate([term.speed for term in terms])
+    return {name: ratio * first for name, ratio in relative_speeds(drive, numbers).items()}
 
 
 def _watch(fitted: FittedModel) -> _Watch:

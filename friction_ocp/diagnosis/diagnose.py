@@ -25,6 +25,7 @@ from friction_ocp.diagnosis.refit import begun_again
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
+from friction_ocp.diagnosis.stand_ins import takes_almost_all
 from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.straying import DRAWS, strays_as_far
 from friction_ocp.diagnosis.worth import innovations
@@ -122,6 +123,25 @@ class Diagnosis:
             return False
         level = max(self.level, 1.0 / (DRAWS + 1)) if self.left_over else self.level
         return self.after.drowned or strays_as_far(self.final, self.after, self.problem.estimation.seed, level)
+
+    @property
+    def torque_noise(self) -> SlowTorque | None:
+        """The shaft whose slow torques tell most, as the torque noise that these may be; None where the file states
+        some."""
+        stated = self.problem.estimation.process_noise.keys() - set(self.problem.estimation.estimated_noise)
+        largest = max(self.slow, key=lambda item: item.ratio, default=None)
+        return None if largest is None or not largest.density or largest.component in stated else largest
+
+    @property
+    def parted_by_torque(self) -> bool:
+        """Whether free runs come no closer, though all but torque noise seems to be explained.
+
+        What was added takes almost all of what was louder than the noise, and leaves slow torques alone. A loop holds a
+        drive whose friction falls with speed, and corrects what torque noise does: without the same noise its recorded
+        current leads every free run elsewhere, the same way, be the model as good as it may.
+        """
+        told = self.torque_noise is not None and significant(self.slow, self.level)
+        return told and not self.carries_over and not self.left_over and takes_almost_all(self.base, self.final)
 
     @cached_property
     def lost(self) -> bool:
@@ -284,7 +304,7 @@ def _in_hindsight(found: Diagnosis) -> Diagnosis:
     """
     overall = found.closed.overall
     closed = min(max(overall, 0.0), 1.0) if math.isfinite(overall) else 0.0
-    unasked = found.by_predictions or found.carries_over or found.lost
+    unasked = found.by_predictions or found.carries_over or found.lost or found.parted_by_torque
     doubt = 0.0 if unasked else 1.0 - closed
     return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, doubt)))
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import scipy.optimize as _optimize  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.contrast import contrast
@@ -30,6 +32,8 @@ from friction_ocp.effects.effect import (
 from friction_ocp.parameters import start_of
 from friction_ocp.simulation.grid import FloatArray
 
+optimize: Any = _optimize  # its own types are incomplete
+
 SHARE = 0.05
 """Size of a constant, over what is typical there, at which it is simulated: small enough to be linear."""
 FAR = 1e9
@@ -37,6 +41,8 @@ FAR = 1e9
 TOLD = 1e-4
 """Power of a combination of constants over the largest one below which it says nothing: where parameters absorb all but
 a hundredth of it, noise of the inputs and the model's curvature make what is left."""
+REACH = 3.0
+"""How far, by its logarithm, the spread of constants is looked for beyond what the largest of them alone would mean."""
 DEVIATIONS = 10.0
 """Size of a channel's constant over its noise floor at which it is simulated."""
 
@@ -50,6 +56,8 @@ class SlowTorque:
     """Mean square of its amplitudes over their variance under noise alone."""
     p_value: float
     """Of a ratio this large under noise, the floors being off by their doubt."""
+    density: float = 0.0
+    """White torque noise of a shaft that makes as much beyond that, N m/sqrt(Hz)."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,8 @@ class Probe:
     component: str
     drive: Drive
     values: Mapping[str, float]
+    torque: float = 0.0
+    """The constant, N m, where it is a torque on a shaft."""
 
 
 def slow_torques(fitted: FittedModel, clues: Clues) -> tuple[SlowTorque, ...]:
@@ -88,7 +98,7 @@ def probes(fitted: FittedModel, clues: Clues) -> Iterator[Probe]:
     for shaft in moving_shafts(drive):
         path, size = f"{shaft.name}.external_torque.constant", SHARE * clues.typical_torque[shaft.name]
         added = change_shaft(drive, shaft.name, external_torque=ExternalTorque(either_way(size)))
-        yield Probe(shaft.name, added, {path: _constant(fitted, shaft) + size})
+        yield Probe(shaft.name, added, {path: _constant(fitted, shaft) + size}, size)
     for item in drive.transmissions:
         if not item.rigid and item.kinematic_error is None:
             stiffness = max(clues.numbers[f"{item.name}.stiffness"], 1e-300)
@@ -149,4 +159,24 @@ def slow_torque_of(fitted: FittedModel, probe: Probe, columns: FloatArray, round
         return SlowTorque(probe.component, 1.0, 1.0)
     amplitudes = axes[:, told].T @ (columns.T @ rows.residual) / np.sqrt(powers[told])
     ratio = float(np.mean(amplitudes**2))
-    return SlowTorque(probe.component, ratio, float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom)))
+    p_value = float(stats.chi2.sf(freedom * ratio / DOUBTED, freedom))
+    spans = [float(np.ptp(item.item.grid.time)) / STRETCHES for item in fitted.linear.recordings]
+    density = probe.torque * spread(amplitudes, powers[told]) * float(np.sqrt(np.mean(spans)))
+    return SlowTorque(probe.component, ratio, p_value, density)
+
+
+def spread(amplitudes: FloatArray, powers: FloatArray) -> float:
+    """Return the likeliest deviation of constants whose amplitudes (k,), over noise of 1, have it by roots of `powers`.
+
+    A normal variance component, by maximum likelihood; 0 where noise alone is likelier.
+    """
+    squares = amplitudes**2
+
+    def loss(log_size: float) -> float:
+        variance = 1.0 + powers * np.exp(2.0 * log_size)
+        return float(np.sum(np.log(variance) + squares / variance))
+
+    middle = 0.5 * np.log(max(float(np.max(squares)), 1.0) / powers)
+    ends = float(np.min(middle)) - REACH, float(np.max(middle)) + REACH
+    best = optimize.minimize_scalar(loss, bounds=ends, method="bounded")
+    return float(np.exp(best.x)) if best.fun < float(np.sum(squares)) else 0.0

@@ -28,11 +28,14 @@ def helps(
     `left_out` returns free runs of both where training recordings took no part in the fits. What does next to nothing
     for them is no more than a shadow, be it most of the gap where it was fitted: of what goes there half the share has
     to go here, for certain; of what leaves no more than noise a part, unless free runs of the current model `stray` as
-    far where noise alone sets them apart. Free runs that are lost say nothing, and against what takes almost all, yet
-    not all, no more than that something else is missing. Where models are compared by short predictions free runs go
-    astray whatever is added, and are not asked.
+    far where noise alone sets them apart. Free runs that are lost say nothing, and against what takes almost all no
+    more than that something else is missing, be it torque noise that nobody has stated: where all that was missing is
+    less than the noise it has to be told from, they are asked yet. Where models are compared by short predictions free
+    runs go astray whatever is added, and are not asked.
     """
     predicted = current.footing.predicted
+    if takes_almost_all(base, current):
+        return True
     if not predicted and not innovations(current).significant(level):
         before, after = left_out()
         told = before.lost or after.drowned
@@ -47,6 +50,13 @@ def helps(
         return True
     as_much = after.excess() <= (1.0 - SHARED * taken / whole) * before.excess()
     return as_much and comes_closer(before, after, current.model.problem.estimation.seed)
+
+
+def takes_almost_all(base: FittedModel, current: FittedModel) -> bool:
+    """Whether the current model takes almost all that the base model lacks, where that is louder than the noise."""
+    noise = 0.5 * samples(base)
+    whole = base.cost - noise
+    return whole > noise and base.cost - current.cost >= ALMOST * whole
 
 
 def fall_short(before: FreeErrors, after: FreeErrors) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.drive.gearing import relative_speeds
 from friction_ocp.drive.parts import Channel, Controller, Drive, Motor
 from friction_ocp.drive.units import signal_unit
 from friction_ocp.drive.values import bind_drive
@@ -210,12 +211,5 @@ def _inertia(fitted: FittedModel) -> float:
     """Return the inertia of the whole drive at its first shaft, kg m^2."""
     model, name = fitted.model, fitted.model.problem.train[0].name
     numbers = model.space.numbers_by_path(fitted.theta, name)
-    total, ratio, shaft = 0.0, {model.problem.drive.shafts[0].name: 1.0}, model.problem.drive.shafts
-    for _ in model.problem.drive.transmissions:
-        for item in model.problem.drive.transmissions:
-            if item.from_shaft in ratio:
-                factor = float(numbers.get(f"{item.name}.ratio", 1.0))
-                ratio.setdefault(item.to_shaft, ratio[item.from_shaft] * factor)
-    for part in shaft:
-        total += float(numbers.get(f"{part.name}.inertia", 0.0)) / ratio.get(part.name, 1.0) ** 2
-    return total
+    speeds = relative_speeds(model.problem.drive, numbers)
+    return sum(float(numbers.get(f"{name}.inertia", 0.0)) * speed**2 for name, speed in speeds.items())

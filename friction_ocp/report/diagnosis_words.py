@@ -30,6 +30,10 @@ def diagnosis_sentence(result: Json) -> str:
         case "undecided":
             likely = f"most likely {_listed(accepted)}{_stray(result) or f', with which {_closed(closed)}.'}"
             return f"There is a gap, and several causes fit it: {likely}"
+        case _ if accepted and part(result, "remainder").get("parted_by_torque"):
+            found = f"Explained in part: the model lacked {_listed(_with_rivals(result))}. {_one_step(result)}"
+            why = f"they lack {_noise_of_torque(result)}, which slow torques show and which a loop has corrected"
+            return f"{found}. Free runs come no closer: it may be that {why}. {_counted(result)}{_cut_short(result)}"
         case _ if accepted and not _lost(result) and not part(result, "remainder").get("carries_over", True):
             where = f"{_listed(_with_rivals(result))} explains part of it where the model was fitted"
             doubt = f"not on recordings left out, where {_closed(closed)}"
@@ -87,12 +91,24 @@ def _stray(result: Json) -> str:
 
 def _torque_noise(result: Json) -> str:
     """Say that what is left may be no more than noise of the torque, and how to have that counted."""
-    shaft = part(result, "remainder").get("as_torque_noise")
-    if shaft is None:
+    if part(result, "remainder").get("as_torque_noise") is None:
         return ""
-    told = "Errors of one-step predictions are no more than noise, so that it may be torque noise that the file lacks"
-    how = f"identify with estimation: {{process_noise: {{{shaft}: estimate}}}} tells how much that would be"
-    return f" {told}: {how}; stated there as a number, it counts as noise."
+    told = "Errors of one-step predictions are no more than noise"
+    return f" {told}: {_noise_of_torque(result)}, would leave as much. {_counted(result)}"
+
+
+def _noise_of_torque(result: Json) -> str:
+    remainder = part(result, "remainder")
+    size = part(remainder, "torque_noise")
+    much = f"about {significant(size['value'], 2)} {unit_text(size['unit'])}"
+    return f"torque noise of {much} at {remainder['as_torque_noise']}, of which the file states none"
+
+
+def _counted(result: Json) -> str:
+    """Say how to have torque noise counted."""
+    shaft = part(result, "remainder")["as_torque_noise"]
+    told = f"Stated in the file as estimation: {{process_noise: {{{shaft}: ...}}}} it counts as noise"
+    return f"{told}; identify with `estimate` there tells how much it is."
 
 
 def _cut_short(result: Json) -> str:

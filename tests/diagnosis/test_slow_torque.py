@@ -21,6 +21,7 @@ from friction_ocp.diagnosis.slow_torque import (
     significant,
     slow_torque_of,
     slow_torques,
+    spread,
     stretched,
 )
 from friction_ocp.estimation.model import prepare
@@ -95,6 +96,15 @@ def test_a_coarse_current_is_no_slow_torque(seed: int, tmp_path: Path) -> None:
     assert white.p_value < 1e-4, "the rounding of the current is what makes the difference"
 
 
+@pytest.mark.parametrize("size", [0.0, 0.5, 20.0])
+def test_the_spread_of_constants_is_told_from_noise(size: float) -> None:
+    """Of 48 that are told very differently well; none where noise alone is likelier."""
+    rng = np.random.default_rng(7)
+    powers = np.geomspace(0.1, 1e3, 48)
+    amplitudes = np.sqrt(1.0 + powers * size**2) * rng.standard_normal(48)
+    assert spread(amplitudes, powers) == pytest.approx(size, rel=0.25, abs=0.03)
+
+
 def test_gusts_are_seen(tmp_path: Path) -> None:
     """A torque that wanders, put into a recording as current that the model is not told of, is found."""
     path = write_case(tmp_path, axis())
@@ -108,6 +118,7 @@ def test_gusts_are_seen(tmp_path: Path) -> None:
     one = found(path)
     assert one.p_value < 1e-6
     assert one.ratio > 2.0
+    assert 0.2 < one.density / (GUSTS * np.sqrt(SECONDS / STRETCHES)) < 1.0
 
 
 def test_the_level_is_shared_among_the_places() -> None:

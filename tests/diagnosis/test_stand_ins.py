@@ -22,6 +22,7 @@ def free_runs(excess: float, lost: bool = False, drowned: bool = False) -> Any:
 @pytest.mark.parametrize(
     ("noise", "taken", "before", "after", "helps"),
     [
+        (True, 0.89, free_runs(100.0), free_runs(98.0), False),
         (True, 0.99, free_runs(100.0), free_runs(98.0), False),
         (True, 0.99, free_runs(100.0), free_runs(40.0), True),
         (True, 0.99, free_runs(100.0), free_runs(98.0, drowned=True), True),
@@ -43,14 +44,27 @@ def test_an_addition_has_to_help_free_runs_too(
     model = SimpleNamespace(problem=SimpleNamespace(estimation=SimpleNamespace(seed=0)))
     foot = SimpleNamespace(predicted=False)
     base = SimpleNamespace(cost=100.0)
-    current = SimpleNamespace(cost=100.0 * (1.0 - taken), model=model, footing=foot)
+    current = SimpleNamespace(cost=100.0 - 40.0 * taken, model=model, footing=foot)
     power = SimpleNamespace(significant=lambda level: not noise)
     monkeypatch.setattr(stand_ins, "innovations", lambda fitted: power)
-    monkeypatch.setattr(stand_ins, "samples", lambda fitted: 0)
+    monkeypatch.setattr(stand_ins, "samples", lambda fitted: 120)
     monkeypatch.setattr(stand_ins, "comes_closer", lambda one, other, seed: other.excess() < one.excess())
     pair = cast(Any, base), cast(Any, current)
     assert stand_ins.helps(*pair, 0.01, lambda: (before, after), lambda: False) == helps
     assert stand_ins.helps(*pair, 0.01, lambda: (before, after), lambda: True) == (helps or noise)
+
+
+@pytest.mark.parametrize(("taken", "helps"), [(0.89, False), (0.99, True)])
+def test_what_takes_almost_all_of_more_than_the_noise_stands(
+    monkeypatch: pytest.MonkeyPatch, taken: float, helps: bool
+) -> None:
+    """Free runs that come no nearer say that torque noise, or something else, is missing beside it."""
+    base, current = (SimpleNamespace(cost=cost, footing=SimpleNamespace(predicted=False)) for cost in (100.0, 0.0))
+    current.cost = 100.0 - 60.0 * taken
+    monkeypatch.setattr(stand_ins, "innovations", lambda fitted: SimpleNamespace(significant=lambda level: False))
+    monkeypatch.setattr(stand_ins, "samples", lambda fitted: 80)
+    runs = free_runs(100.0), free_runs(98.0)
+    assert stand_ins.helps(cast(Any, base), cast(Any, current), 0.01, lambda: runs, lambda: False) == helps
 
 
 def rival(key: Key, cost: float, determined: int) -> Any:

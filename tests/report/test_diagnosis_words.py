@@ -41,10 +41,16 @@ def test_an_unknown_effect_alone_is_no_part() -> None:
 
 def test_what_may_be_torque_noise_is_told_with_how_to_have_it_counted() -> None:
     """Where errors of one-step predictions show nothing, and a slow torque is left on a shaft."""
-    rest = {"as_torque_noise": "slide"}
+    rest: dict[str, object] = {"as_torque_noise": "slide", "torque_noise": {"value": 0.0349, "unit": "N/sqrt(Hz)"}}
     said = diagnosis_sentence(result("unknown_effect", accepted=[], remainder=rest))
-    assert "nothing in the catalogue explains it. Errors of one-step predictions are no more than noise" in said
-    assert "identify with estimation: {process_noise: {slide: estimate}} tells how much that would be" in said
+    assert "nothing in the catalogue explains it. Errors of one-step predictions are no more than noise: torque" in said
+    assert "noise of about 0.035 N/sqrt(Hz) at slide, of which the file states none, would leave as much" in said
+    assert "Stated in the file as estimation: {process_noise: {slide: ...}} it counts as noise; identify with" in said
+    rest |= {"parted_by_torque": True, "carries_over": False, "ratio_before": 7.5, "ratio": 1.1}
+    said = diagnosis_sentence(result("unknown_effect", accepted=[LOAD], remainder=rest))
+    assert said.startswith("Explained in part: the model lacked load dependence at servo")
+    assert "Free runs come no closer: it may be that they lack torque noise of about 0.035 N/sqrt(Hz) at slide" in said
+    assert "probably another" not in said and "identify with `estimate` there tells how much it is." in said
     rest = {"as_torque_noise": None}
     assert "process_noise" not in diagnosis_sentence(result("unknown_effect", accepted=[], remainder=rest))
 
