@@ -139,11 +139,11 @@ def completed_rivals(
 
     What lost free runs promise is no prediction, and nothing is made thorough that is far behind there. Nor is anything
     completed at first that will not come as far as the best has come, unless it resembles that.
-    What comes as near as the best that matters is completed beside it: what fits better and is not to be added leaves
-    the field to that. What fits best where it was fitted may be worth nothing on recordings left out. Where it gains
-    what is `asked` of it and yet will not do, it may have come to rest on the way: at last the best of those begin at
-    other sizes. The first FINISHED are completed in any case, and what comes near; others as long as the search is not
-    `exhausted`.
+    What comes as near as the best that matters is completed beside it, and begun again from its node states: what fits
+    better and is not to be added leaves the field to that. What fits best where it was fitted may be worth nothing on
+    recordings left out. Where it gains what is `asked` of it and yet will not do, it may have come to rest on the way:
+    at last the best of those begin at other sizes. The first FINISHED are completed in any case, and what comes near;
+    others as long as the search is not `exhausted`.
     """
     if not chosen:
         return
@@ -173,6 +173,7 @@ def completed_rivals(
     if near:
         others = [k for k in others if k not in near]
         rivals = [*rivals, *crew.rivals([refits[k] for k in near], without, asked)]
+    rivals = crew.levelled(rivals, reached, without, asked)
     yield rivals
     if others and exhausted():
         return

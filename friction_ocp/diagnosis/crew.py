@@ -15,7 +15,14 @@ from friction_ocp.diagnosis.bench import Bench, point_document, seated, value_of
 from friction_ocp.diagnosis.benchmark import blocks_like
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import held_out
-from friction_ocp.diagnosis.refit import begun_at_size, best_nudged, completed, fitted_loosely, quick_refit
+from friction_ocp.diagnosis.refit import (
+    begun_at_size,
+    begun_beside,
+    best_nudged,
+    completed,
+    fitted_loosely,
+    quick_refit,
+)
 from friction_ocp.diagnosis.rival import Rival, Standing, is_another
 from friction_ocp.diagnosis.screen import Screened, Start, screen
 from friction_ocp.effects.effect import Augmentation, Key, Trial
@@ -129,6 +136,39 @@ class Crew:
         values = self._run("completing refits", tasks, 0.75)
         return [self._rival(refit.screened, value, without) for refit, value in zip(tried, values, strict=True)]
 
+    def levelled(
+        self, rivals: Sequence[Rival], most: float, without: FloatArray, asked: Mapping[Key, float]
+    ) -> list[Rival]:
+        """Return rivals, those of at most some cost begun again from where the segments of the best one begin.
+
+        And that from where those of what is then better do.
+        """
+        found = {item.key: item for item in rivals if item.standing.cost <= most}
+        if not self.bench.current.footing.joined:
+            return [*rivals]
+        for _ in range(2 if len(found) > 1 else 0):
+            best = min(found.values(), key=lambda item: item.standing.cost)
+            nodes = point_document(best.fitted)
+            others = [item for item in found.values() if item is not best]
+            tasks = [
+                self._task(
+                    f"beside-{best.key[0]}-{best.key[1]}",
+                    item.key,
+                    complete_beside,
+                    (screened_document(item.screened), point_document(item.fitted), nodes, asked[item.key]),
+                )
+                for item in others
+            ]
+            values = self._run("completing refits from one another", tasks, 0.75)
+            found |= {
+                item.key: self._rival(item.screened, value, without)
+                for item, value in zip(others, values, strict=True)
+                if value is not None
+            }
+            if min(item.standing.cost for item in found.values()) >= best.standing.cost:
+                break
+        return [found.get(item.key, item) for item in rivals]
+
     def retried(self, known: Sequence[Rival], without: FloatArray, asked: Mapping[Key, float]) -> list[Rival]:
         """Return rivals, each from the best of the end that is known and those that begin at other sizes."""
         pairs = [(item, k) for item in known for k in range(len(OTHER_SIZES))]
@@ -229,6 +269,14 @@ def complete_candidate(bench: Bench, content: Json, point: Json, asked: float, t
     if thorough and bench.current.lost and not fitted.astray:
         fitted = best_nudged(fitted, bench.problem.estimation.seed)
     return _judged(bench, item, fitted, asked)
+
+
+def complete_beside(bench: Bench, content: Json, point: Json, other: Json, asked: float) -> Json:
+    """Fit a candidate again from the node states of another one; null where that is no better."""
+    item = restored_screened(bench, content)
+    known = seat_candidate(bench, item, point)
+    fitted = begun_beside(known, restored(other)["nodes"])
+    return None if fitted is known else _judged(bench, item, fitted, asked)
 
 
 def retry_candidate(bench: Bench, content: Json, scale: float, asked: float) -> Json:

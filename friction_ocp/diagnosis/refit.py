@@ -144,6 +144,18 @@ def completed(fitted: FittedModel, thorough: bool = True) -> FittedModel:
     return ended if ended.leads_loosely or left else freed(ended)
 
 
+def begun_beside(fitted: FittedModel, nodes: Sequence[FloatArray]) -> FittedModel:
+    """Fit again from the node states of another model, if that is better; the same where they are of another kind.
+
+    Exact friction lets every short segment stick or slide, and ends differ by which of them do: two models that say the
+    same in other words would seem to be told apart by that.
+    """
+    if not fitted.footing.joined or [one.shape for one in nodes] != [one.shape for one in fitted.linear.point.nodes]:
+        return fitted
+    again = polished(fitted.model, fitted.footing, fitted.theta, tuple(nodes))
+    return again if again.objective < fitted.objective - UNIMPORTANT else fitted
+
+
 def nudged(fitted: FittedModel, seed: int) -> FittedModel:
     """Fit again from parameters that chance has changed a little.
 

@@ -12,7 +12,7 @@ from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.finer_steps import on_steps_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.reexamine import gaining, weighed_again
-from friction_ocp.diagnosis.refit import MOST_OF
+from friction_ocp.diagnosis.refit import MOST_OF, begun_beside
 from friction_ocp.diagnosis.rival import Rival, is_same
 from friction_ocp.diagnosis.select import Round, with_first, without
 from friction_ocp.diagnosis.worth import grows
@@ -46,7 +46,7 @@ def weighed_in_shape(
             break
         done = _likeliest(grown(rival)) if grows(rival, bench.clues) else None
         shapes[rival.key] = [] if done is None else [done]
-        fitted = rival.fitted if done is None else _held(done).fitted
+        fitted = begun_beside(rival.fitted if done is None else _held(done).fitted, benchmark.fitted.linear.point.nodes)
         gains = -benchmark.dearer(fitted)
         if benchmark.yields(fitted, gains, level, rng):
             held, choice = _held(first), with_first(first.choice, rival)

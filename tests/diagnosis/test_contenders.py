@@ -6,7 +6,9 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
+from friction_ocp.diagnosis import crew as crew_module
 from friction_ocp.diagnosis.contenders import completed_rivals, to_refit
 from friction_ocp.diagnosis.crew import Crew, Refit
 from friction_ocp.diagnosis.rival import Rival
@@ -42,7 +44,8 @@ def completed(
     def without(shortlist: list[Screened], unfitted: list[Screened]) -> tuple[None, list[Refit]]:
         return None, refits
 
-    crew = SimpleNamespace(bench=SimpleNamespace(current=current), without=without, rivals=rivals)
+    level = SimpleNamespace(levelled=lambda some, *_: some)
+    crew = SimpleNamespace(bench=SimpleNamespace(current=current), without=without, rivals=rivals, **vars(level))
     asked = {item.key: np.inf for item in screened}
     known = {item.key: item for item in screened}
     found = completed_rivals(cast(Crew, crew), screened, [], known, asked, lambda: exhausted)
@@ -143,3 +146,28 @@ def test_the_shape_of_what_segments_have_found_is_tried_whatever_it_promises_whe
         chosen, unfitted = to_refit(crew, found[:1], found, shapes)
         assert [item.effect for item in chosen] == named
         assert [item.effect for item in unfitted] == named
+
+
+@pytest.mark.parametrize(("joined", "asked"), [(True, [["b"]]), (False, [])])
+def test_what_comes_as_near_begins_again_from_the_node_states_of_the_best(
+    joined: bool, asked: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where segments are joined, each of which may stick or slide; what is far behind does not."""
+    monkeypatch.setattr(crew_module, "point_document", lambda fitted: fitted)
+    monkeypatch.setattr(crew_module, "screened_document", lambda item: item)
+    turns = list[list[str]]()
+
+    def run(what: str, tasks: list[Any], begin: float) -> list[Any]:
+        turns.append([task.arguments[0] for task in tasks])
+        return [None for _ in tasks]
+
+    bench = SimpleNamespace(current=SimpleNamespace(footing=SimpleNamespace(joined=joined)))
+    found = [
+        cast(Any, SimpleNamespace(key=(name, "motor"), standing=SimpleNamespace(cost=cost), fitted=0, screened=name))
+        for name, cost in (("a", 100.0), ("b", 101.0), ("c", 200.0))
+    ]
+    crew: Any = Crew(cast(Any, bench), cast(Any, None), 1, lambda what, share: None)
+    monkeypatch.setattr(Crew, "_run", lambda self, *rest: run(*rest))
+    asks = {item.key: 1.0 for item in found}
+    assert crew.levelled(found, 110.0, np.zeros(1), asks) == found
+    assert turns == asked
