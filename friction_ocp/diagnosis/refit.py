@@ -39,7 +39,8 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
     The prediction is linear: the size at which a simulation comes closest to the recordings is where steps begin, too.
     Where they gain less than it promises, under a large misfit, wide gaps lead the way from where the parameters were;
     where most of a misfit stays, steps begin at a large effect, too. Of free runs that miss much steps begin where
-    loosely joined segments lead, too, and so they always do at large effects that no prediction shows.
+    loosely joined segments lead, too, and so they always do at large effects that no prediction shows. Where nearly the
+    same can be done another way, the end begins there again.
     """
     drive = item.augmentation.drive
     model, built = with_drive(base.model, drive), contrast(base.model, base.linear, drive)
@@ -61,7 +62,11 @@ def quick_refit(base: FittedModel, item: Screened) -> FittedModel:
         ends += [
             _steps(base, model, program, _point(base, model, built, {**base.values, **values})) for values in tried
         ]
-    return min(ends, key=lambda fitted: fitted.objective)
+    found = min(ends, key=lambda fitted: fitted.objective)
+    if item.augmentation.otherwise is None:
+        return found
+    theta = model.space.with_known({**base.values, **found.values, **item.augmentation.otherwise(found.values)})
+    return min(found, timed(polished(model, base.footing, theta, None, QUICK), QUICK), key=lambda end: end.objective)
 
 
 def fitted_loosely(loose: FittedModel, item: Screened) -> float:

@@ -213,6 +213,8 @@ class Augmentation:
     trials: tuple[Trial, ...]
     large: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Gives values at which a large effect may begin, from those of a small one; None where size is all that grows."""
+    otherwise: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
+    """Gives values that do nearly the same another way, from those where a refit ended; None where there is none."""
     outright: tuple[Mapping[str, float], ...] = ()
     """Values at which a large effect may begin of which small ones tell nothing: no derivative shows a flank out of
     reach. Empty where they do."""

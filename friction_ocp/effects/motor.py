@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from friction_ocp.drive.parts import SHARPNESS, Drive, Motor
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Trial, change_motor, motor_of, upwards
 from friction_ocp.parameters import Free, is_off
+
+SHORT = 0.01
+"""Lag over the time between samples with which a fit begins in which dead time does all."""
 
 
 def _motors(drive: Drive) -> list[Motor]:
@@ -59,7 +62,12 @@ class DriveLagEffect(AbstractEffect):
             return Augmentation(added, {path: 0.0}, tuple(Trial(({path: one},)) for one in times))
         dead = f"{motor.name}.dead_time"
         added = change_motor(drive, motor.name, lag=lag, dead_time=Free(0.1 * step, 0.0, 100.0 * step))
-        return Augmentation(added, {path: 0.0, dead: 0.0}, tuple(Trial(({path: one}, {dead: step})) for one in times))
+        trials = tuple(Trial(({path: one}, {dead: step})) for one in times)
+
+        def all_dead(values: Mapping[str, float]) -> dict[str, float]:
+            return {path: SHORT * step, dead: values[path] + values[dead]}
+
+        return Augmentation(added, {path: 0.0, dead: 0.0}, trials, otherwise=all_dead)
 
     def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
         """Return the drive whose motor begins to follow after a dead time, where a loop or other motors feel it."""
