@@ -56,7 +56,7 @@ def test_a_large_effect_is_tried_where_a_small_one_leaves_most(
     base = SimpleNamespace(
         model=None, linear=None, footing=footing, objective=600.0, missed=missed, astray=False, lost=False, values={}
     )
-    augmentation = SimpleNamespace(drive=None, off={}, outright=(), large=lambda added: values)
+    augmentation = SimpleNamespace(drive=None, off={}, outright=(), otherwise=None, large=lambda added: values)
     start = SimpleNamespace(added=lambda off: {"mode": 0.01})
     item: Any = SimpleNamespace(augmentation=augmentation, starts=(start,), gain=1.0)
     found = refit.quick_refit(cast(Any, base), item)
