@@ -30,8 +30,8 @@ def helps(
     to go here, for certain; of what leaves no more than noise a part, unless free runs of the current model `stray` as
     far where noise alone sets them apart. Free runs that are lost say nothing, and against what takes almost all no
     more than that something else is missing, be it torque noise that nobody has stated: where all that was missing is
-    less than the noise it has to be told from, they are asked yet. Where models are compared by short predictions free
-    runs go astray whatever is added, and are not asked.
+    less than the noise it has to be told from, they are asked all the same. Where models are compared by short
+    predictions free runs go astray whatever is added, and are not asked.
     """
     predicted = current.footing.predicted
     if takes_almost_all(base, current):
