@@ -100,8 +100,7 @@ def _plausible(model: Model, theta: FloatArray) -> FloatArray:
 def _joined(model: Model, foot: Footing, theta: FloatArray, nodes: tuple[FloatArray, ...] | None) -> FittedModel:
     """Fit segments that torque noise joins, as a footing lays them, from a start."""
     started = polished(model, foot, theta, nodes)
-    with limited(of_base(started)):
-        return freed(timed(_from_rest(_from_afar(started, [model.space.guess, theta]))))
+    return _ended(_from_afar(started, [model.space.guess, theta]))
 
 
 def predicting(fitted: FittedModel) -> FittedModel:
@@ -133,15 +132,19 @@ def _free_base(model: Model, rough: Footing) -> FittedModel:
     starts = [model.space.guess, _rough_answer(model)[1].theta]
     best = min((_coarse(model, rough, theta) for theta in starts), key=lambda end: end.objective)
     foot = footing(model, best.theta)
-    started = polished(model, foot, best.theta, best.linear.point.nodes)
-    with limited(of_base(started)):
-        return freed(timed(_from_rest(started)))
+    return _ended(polished(model, foot, best.theta, best.linear.point.nodes))
 
 
 def _coarse(model: Model, foot: Footing, theta: FloatArray) -> FittedModel:
     program, theta = foot.training(model), model.space.clip(theta)
     start = solve_nodes(program, suggested_point(program, theta))
     return polished(model, foot, theta, start.nodes, COARSE)
+
+
+def _ended(fitted: FittedModel) -> FittedModel:
+    """Fit from rest, in time and around kinks, for as long as a base model may take for that."""
+    with limited(of_base(fitted)):
+        return freed(timed(_from_rest(fitted)))
 
 
 def _from_rest(fitted: FittedModel) -> FittedModel:

@@ -144,9 +144,9 @@ class Crew:
         And that from where those of what is then better do.
         """
         found = {item.key: item for item in rivals if item.standing.cost <= most}
-        if not self.bench.current.footing.joined:
+        if len(found) < 2 or not self.bench.current.footing.joined:
             return [*rivals]
-        for _ in range(2 if len(found) > 1 else 0):
+        for _ in range(2):
             best = min(found.values(), key=lambda item: item.standing.cost)
             nodes = point_document(best.fitted)
             others = [item for item in found.values() if item is not best]
