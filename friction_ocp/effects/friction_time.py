@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.beginnings import begins_apart
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
@@ -24,16 +25,22 @@ from friction_ocp.friction.modifiers import WarmUp
 from friction_ocp.friction.static import NoFriction
 from friction_ocp.parameters import Free
 
+TIMES = (0.1, 0.3, 1.0)
+"""Time constants over the longest recording at which it is tried."""
 MOST = 5.0
 """Relative change of friction at its typical loss, at most: where that warms it, no loss can take friction away
 altogether, since it goes with it."""
+BEGUN = Free(0.1, -2.0, 2.0, prior_std=0.5, prior_mean=0.0, scope="recording")
+"""How far friction has settled where a recording begins. Between a level and all of these a shift says nothing: what is
+likely beforehand holds them."""
 
 
 class WarmUpEffect(AbstractEffect):
     """Friction drifts with time or with what it loses, or with the temperature where that is recorded.
 
     Without a temperature the viscous part need not drift as the dry part does: a lubricant gets thin before a contact
-    gets smooth; and what warms it are its own losses, something else, or both.
+    gets smooth; and what warms it are its own losses, something else, or both. Recordings begin as warm as one another,
+    or each in its own way where they show that; also once it was accepted.
     """
 
     name: ClassVar[str] = "warm_up"
@@ -45,13 +52,14 @@ class WarmUpEffect(AbstractEffect):
                 yield shaft.name
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
-        shaft, path = drive.shaft(place), f"{place}.friction.warm_up"
+        shaft, path = drive.shaft(place), _path(place)
         if any(item.measures == "temperature" for item in drive.inputs):
             part = WarmUp(per_kelvin=Free(-0.01, -0.2, 0.2), reference_temperature=25.0)
             off, trials = {f"{path}.per_kelvin": 0.0}, (Trial(({f"{path}.per_kelvin": -0.005},)),)
         else:
             longest = max(float(track.time[-1] - track.time[0]) for track in clues.tracks)
-            times = [0.1 * longest, 0.3 * longest, longest]
+            times = [share * longest for share in TIMES]
+            begun = begins_apart(drive, place, clues)
             sizes = {f"{path}.amplitude": -0.05}
             part = WarmUp(
                 amplitude=Free(-0.1, -MOST, MOST),
@@ -63,14 +71,33 @@ class WarmUpEffect(AbstractEffect):
                 part = replace(part, viscous_excess=Free(0.0, -MOST, MOST))
                 sizes[f"{path}.viscous_excess"] = -0.05
             off = dict.fromkeys(sizes, 0.0)
+            if begun is not None:
+                part = replace(part, begun=BEGUN)
+                times = sorted(times, key=lambda one: abs(np.log(one / begun.time_constant)))
+            starts = {} if begun is None else begun.by_path(path)
             amplitudes = tuple({name: size} for name, size in sizes.items())
             trials = tuple(
-                Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share})
+                Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share, **starts})
                 for one in times
                 for share in (0.0, 1.0)
             )
         added = change_shaft(drive, place, friction=replace(shaft.friction, warm_up=part))
         return Augmentation(added, off, trials, inside=tuple(off))
+
+    def reshaped(self, drive: Drive, place: str, clues: Clues) -> Augmentation | None:
+        part, path = drive.shaft(place).friction.warm_up, _path(place)
+        if part is None or part.amplitude is None or part.begun is not None:
+            return None
+        if begins_apart(drive, place, clues) is None:
+            return None
+        off = {f"{path}.begun@{name}": 0.0 for name in clues.recordings}
+        moved = replace(drive.shaft(place).friction, warm_up=replace(part, begun=BEGUN))
+        trial = Trial(tuple({name: BEGUN.guess} for name in off))
+        return Augmentation(change_shaft(drive, place, friction=moved), off, (trial,))
+
+
+def _path(place: str) -> str:
+    return f"{place}.friction.warm_up"
 
 
 def _typical_loss(drive: Drive, place: str, clues: Clues) -> float:

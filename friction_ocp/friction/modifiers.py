@@ -43,9 +43,9 @@ class WarmUp:
 
     .. math:: \text{time\_constant} \, \dot W = 1 - \text{loss\_share} + \text{loss\_share} \, P / \text{power} - W
 
-    T is the measured temperature and P the power that the friction itself loses at steady speed; W is 0 at the start
-    of the recording, and 1 - exp(-t / time_constant) without the losses. `viscous_excess` is added to the amplitude
-    where viscous friction is meant.
+    T is the measured temperature and P the power that the friction itself loses at steady speed; W is `begun` at the
+    start of the recording, and 1 - (1 - begun) exp(-t / time_constant) without the losses. `viscous_excess` is added to
+    the amplitude where viscous friction is meant.
     """
 
     per_kelvin: Value = quantity("per_kelvin", "relative change of friction with the temperature", 0.0)
@@ -55,6 +55,7 @@ class WarmUp:
     viscous_excess: Value = quantity("dimensionless", "relative change of viscous friction beyond that of all", None)
     loss_share: Value = quantity("dimensionless", "share of the warming that goes with the friction's own losses", 0.0)
     power: Value = quantity("power", "loss at which friction settles at the amplitude", None)
+    begun: Value = quantity("dimensionless", "how far friction has settled where a recording begins", None)
 
     @property
     def idle(self) -> bool:
@@ -79,6 +80,7 @@ class WarmUp:
             None if amplitude is None else self.viscous_excess,
             loss_share,
             None if loss_share is None else self.power,
+            None if amplitude is None or is_off(self.begun) else self.begun,
         )
 
     def factors(self, surroundings: Surroundings) -> tuple[Any, Any]:
@@ -94,7 +96,8 @@ class WarmUp:
 
     def risen(self, time: Any) -> Any:
         """Return how far friction has settled after some time under losses as large as `power`, or without any."""
-        return -expm1(-time / self.time_constant)
+        rise = -expm1(-time / self.time_constant)
+        return rise if self.begun is None else self.begun + (1.0 - self.begun) * rise
 
     def rate(self, warmth: Any, loss: Any) -> Any:
         """Return the time derivative of the warmth under a loss, W."""

@@ -44,7 +44,7 @@ def left_out(fitted: Fitted) -> Iterator[str]:
         if element.ripple is not None:
             yield f"ripple of the friction of {shaft.name}: its mean over the angle is taken"
         if element.warm_up is not None:
-            yield f"warm-up of {shaft.name}: it is the friction at the start"
+            yield f"warm-up of {shaft.name}: it is the friction before any"
         forces = (
             ("gravity", shaft.gravity),
             ("external torque", shaft.external_torque),
