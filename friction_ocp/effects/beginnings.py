@@ -56,8 +56,8 @@ def begins_apart(drive: Drive, place: str, clues: Clues) -> Beginnings | None:
     longest = max(float(np.ptp(track.time)) for track in clues.tracks)
     shared, apart = list[float](), list[tuple[float, float, FloatArray]]()
     for constant in longest * np.geomspace(SHORTEST, LONGEST, LOOKED_AT):
-        fading = without((friction * np.exp(-time / constant))[:, None] * own, made_up_for)
-        sizes: FloatArray = np.linalg.lstsq(fading, lacking, rcond=None)[0]
+        fading: FloatArray = without((friction * np.exp(-time / constant))[:, None] * own, made_up_for)
+        sizes = np.linalg.lstsq(fading, lacking, rcond=None)[0].astype(np.float64)
         apart.append((_taken(fading, lacking), float(constant), sizes))
         shared.append(_taken(fading.sum(axis=1, keepdims=True), lacking))
     most, constant, sizes = max(apart, key=lambda one: one[0])

@@ -61,6 +61,9 @@ def _stacked(items: list[Any]) -> Any:
     return items[0] if len(items) == 1 else ca.vertcat(*[ca.SX(item) for item in items])
 
 
+LEAST_REACH = 1e-12
+"""Deflection at breakaway, rad or m, below which there is no friction: what divides by it has a value all the same."""
+
 Slipping = AbstractBristleLaw | AbstractMaxwellSlip
 """Laws that may have springs that slip."""
 
@@ -120,13 +123,17 @@ class FrictionElement:
         return smooth_sign(omega, width) * where(omega >= 0, positive, negative)
 
     def forgetting_rate(self, omega: Any, deflection: Any, transmitted: Any) -> Any:
-        """Return sigma0 |omega| / g(omega), the rate at which the bristle forgets its deflection."""
-        speed = smooth_abs(omega)
+        """Return sigma0 |omega| / g(omega), the rate at which the bristle forgets its deflection.
+
+        Without friction, g = 0, it does so within LEAST_REACH.
+        """
+        speed, stiffness = smooth_abs(omega), self._sigma(0, deflection)
         levels = [
             law.level(speed) + self._load_level(side, speed, transmitted, with_viscous=False)
             for side, law in self._bristles()
         ]
-        return self._sigma(0, deflection) * speed / where(omega >= 0, levels[0], levels[1])
+        level, least = where(omega >= 0, levels[0], levels[1]), LEAST_REACH * stiffness
+        return stiffness * speed / where(level > least, level, least)
 
     def _bristles(self) -> list[tuple[Direction, AbstractBristleLaw]]:
         sides: list[tuple[Direction, AbstractBristleLaw]] = []

@@ -326,6 +326,13 @@ CASES: dict[str, Case] = {
         MOVING,
         one_mass(lambda t, q, v: command(t) - (0.1 + 0.02 * v) * warmth(t)),
     ),
+    "warm-up begun warm": Case(
+        axis(FrictionElement(LAW, warm_up=replace(WARM, begun=0.4))),
+        MOVING,
+        one_mass(
+            lambda t, q, v: command(t) - (0.1 + 0.02 * v) * (1 + 0.01 * (TEMPERATURE - 20) - 0.3 * (0.4 + 0.6 * risen(t)))
+        ),
+    ),
     "warm-up of viscous friction": Case(
         axis(FrictionElement(LAW, warm_up=replace(WARM, viscous_excess=-0.4))),
         MOVING,
@@ -552,3 +559,20 @@ def test_what_a_term_needs_is_asked_for() -> None:
         "axis.friction.warm_up.time_constant",
         "axis.friction.warm_up.power",
     ]
+
+
+@pytest.mark.parametrize("omega", [0.0, 1e-9, 4.0])
+def test_a_bristle_without_friction_holds_nothing(omega: float) -> None:
+    """Fits end where one shaft has none; the step and its derivatives have values there, those of drag alone."""
+    law = LuGre(tau_c=Free(0.0), tau_s=0.0, omega_s=0.1, sigma0=100.0, sigma1=0.0, sigma2=0.02)
+    made, numbers = step_of(axis(FrictionElement(law)))
+    plain, plain_numbers = step_of(axis(FrictionElement(CoulombViscous(0.0, 0.02))))
+    x, p = (ca.SX.sym(symbol, size) for symbol, size in (("x", len(made.state_names)), ("p", numbers.size)))
+    inputs = [{"torque": 0.4, "temperature": 30.0}[item] for item in made.input_names]
+    width = np.zeros(len(made.mechanism.topology.roots) + 1)
+    after = made.step(x, inputs, p, 1e-3, width)
+    function = ca.Function("after", [x, p], [after, ca.jacobian(after, x), ca.jacobian(after, p)])
+    end, *slopes = function([0.4, omega, 0.0], numbers)
+    assert all(np.all(np.isfinite(np.asarray(slope))) for slope in slopes)
+    wanted = plain.step([0.4, omega], inputs, plain_numbers, 1e-3, width)
+    assert np.asarray(end).ravel()[:2] == pytest.approx(np.asarray(wanted).ravel(), rel=1e-6)
