@@ -380,7 +380,7 @@ def _assumptions(diagnosis: Diagnosis, part: dict[str, Any] | None) -> list[str]
     lines.append(f"the catalogue: {', '.join(meant.entries)}")
     left_out += [AT.join(key) for key in sorted(meant.excluded)]
     lines += [f"left out of the catalogue by the file: {', '.join(left_out)}"] if left_out else []
-    return lines
+    return [*lines, *diagnosis.unexamined]
 
 
 def sides(drive: Drive) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
 
@@ -62,6 +62,8 @@ class Crew:
     tell: Tell
     readings: OtherReadings | None = None
     """What is fitted beside the refits."""
+    unexamined: list[str] = field(default_factory=list[str])
+    """Why candidates whose work failed were left out, a line each."""
 
     def screened(self, candidates: Sequence[Key]) -> list[Screened]:
         """Return the score tests of candidates, (effect, component) each, largest predicted gain first."""
@@ -87,7 +89,8 @@ class Crew:
         Minus infinity where the simulation breaks down.
         """
         tasks = [self._task("fit-loose", item.key, fit_loose, (screened_document(item),)) for item in candidates]
-        return [float(restored(value)) for value in self._run("fits on loosely joined segments", tasks, 0.4)]
+        values = self._run("fits on loosely joined segments", tasks, 0.4)
+        return [-np.inf if value is None else float(restored(value)) for value in values]
 
     def _tested(self, what: str, tasks: Sequence[Task], begin: float) -> list[Screened]:
         found = [restored_screened(self.bench, value) for value in self._run(what, tasks, begin) if value is not None]
@@ -106,7 +109,7 @@ class Crew:
         tasks += aside  # takes longer than a refit, mostly, and what takes long comes first
         tasks += [self._task("refit", item.key, refit_candidate, (screened_document(item),)) for item in shortlist]
         tasks += [self._task("begin", item.key, refit_unfitted, (screened_document(item),)) for item in unfitted]
-        costs, *values = self._run("refits", tasks, 0.5)
+        costs, *values = self._run("refits", tasks, 0.5, 1 + len(aside))
         ends = values[len(aside) :]
         if self.readings is not None:
             self.readings.keep(self.bench, values[: len(aside)])
@@ -134,7 +137,8 @@ class Crew:
             for k, refit in enumerate(tried)
         ]
         values = self._run("completing refits", tasks, 0.75)
-        return [self._rival(refit.screened, value, without) for refit, value in zip(tried, values, strict=True)]
+        ends = zip(tried, values, strict=True)
+        return [self._rival(refit.screened, value, without) for refit, value in ends if value is not None]
 
     def levelled(
         self, rivals: Sequence[Rival], most: float, without: FloatArray, asked: Mapping[Key, float]
@@ -195,13 +199,23 @@ class Crew:
     def _task(self, what: str, key: Key, function: Callable[..., Json], arguments: tuple[Any, ...]) -> Task:
         return Task(f"{self.number}-{what}-{key[0]}-{key[1]}", function, arguments)
 
-    def _run(self, what: str, tasks: Sequence[Task], begin: float) -> list[Json]:
+    def _run(self, what: str, tasks: Sequence[Task], begin: float, vital: int = 0) -> list[Json]:
+        """Return what tasks have found, the first of them `vital`; null where work on one candidate failed.
+
+        That costs the search this candidate, not all the others; a search without any is none.
+        """
+
         def watch(tally: Tally) -> None:
             self.tell(f"{what}: {tally.done} of {tally.total}", begin + 0.25 * tally.done / max(tally.total, 1))
 
         bench, run = self.bench, self.execution
-        outcomes = run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch)
-        return [value_of(outcome) for outcome in outcomes.values()]
+        outcomes = [*run_tasks(what, tasks, bench, bench.fingerprint, run.executor, run.ledger, watch).values()]
+        own = outcomes[vital:]
+        failed = [item for item in own if item.trace]
+        if len(failed) == len(own) > 1:
+            failed = []
+        self.unexamined.extend(f"{item.key} failed, and its candidate was left out: {item.error}" for item in failed)
+        return [None if item in failed else value_of(item) for item in outcomes]
 
 
 def screen_candidate(bench: Bench, effect: str, place: str) -> Json:

@@ -67,6 +67,8 @@ class Diagnosis:
     """What the search took, over its limit."""
     cut_short: bool = False
     """Whether the search ended there, with things left to try."""
+    unexamined: tuple[str, ...] = ()
+    """Why candidates whose work failed were left out, a line each."""
     stated: Problem | None = None
     """The problem as it was given, where its inputs are not read as it states or its loop is opened."""
 
@@ -293,6 +295,7 @@ def _concluded(problem: Problem, search: Search, began: float) -> Diagnosis:
             seconds=time.perf_counter() - began,
             effort=search.allowance.taken,
             cut_short=search.allowance.spent,
+            unexamined=tuple(search.unexamined),
         )
     )
 

@@ -65,6 +65,8 @@ class Search:
     """Rounds that no longer count, with what they had added."""
     outdone: Problem | None = None
     """The problem with its inputs read another way, where that alone does more than any addition: no more is tried."""
+    unexamined: list[str] = field(default_factory=list[str])
+    """Why candidates whose work failed were left out, a line each."""
     _begun: int = 0
     _fitted_base: FittedModel | None = None
 
@@ -353,6 +355,9 @@ class Search:
                 return
         self.bench, self.rounds, self.accepted = self.bench.at(self.bench.base), [withdrawn(first)], []
 
+    def _told_of(self, number: int) -> Tell:
+        return lambda what, share: self.tell(f"round {number}: {what}", share)
+
     def _round(self, bench: Bench, accepted: Sequence[Key], meant: Considered) -> Round:
         """Decide on an addition to the model of a bench, or on a more general shape of what it has.
 
@@ -363,7 +368,7 @@ class Search:
         current, blocks, level = bench.current, bench.current.blocks, self.level
         power = excess(current.linear.rows, blocks)
         aside = None if accepted or not power.significant(level) else self.readings
-        crew = Crew(bench, self.run, number, lambda what, share: self.tell(f"round {number}: {what}", share), aside)
+        crew = Crew(bench, self.run, number, self._told_of(number), aside, self.unexamined)
         enough = required(bench.base, current) if meant.names else np.inf
         again = shapes(current, bench.clues, accepted)
         keys = [*places(current, meant), *again]

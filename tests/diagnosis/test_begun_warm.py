@@ -41,7 +41,7 @@ DRIVE = Drive(shafts=(Shaft("motor", 1e-3, FrictionElement(CoulombViscous(LEVEL,
 
 
 def tracks(cold: Sequence[float], settles: float = TIME_CONSTANT) -> tuple[Track, ...]:
-    """Return recordings whose friction is 30 % higher than a model says times a share each, and settles; beside noise."""
+    """Return recordings whose friction is higher than a model says, times a share each, and settles; beside noise."""
     rng, made = np.random.default_rng(5), list[Track]()
     time, middle = INTERVAL * np.arange(SAMPLES), np.arange(2, SAMPLES, 4)
     for k, share in enumerate(cold):

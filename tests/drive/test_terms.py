@@ -330,7 +330,9 @@ CASES: dict[str, Case] = {
         axis(FrictionElement(LAW, warm_up=replace(WARM, begun=0.4))),
         MOVING,
         one_mass(
-            lambda t, q, v: command(t) - (0.1 + 0.02 * v) * (1 + 0.01 * (TEMPERATURE - 20) - 0.3 * (0.4 + 0.6 * risen(t)))
+            lambda t, q, v: (
+                command(t) - (0.1 + 0.02 * v) * (1 + 0.01 * (TEMPERATURE - 20) - 0.3 * (0.4 + 0.6 * risen(t)))
+            )
         ),
     ),
     "warm-up of viscous friction": Case(
