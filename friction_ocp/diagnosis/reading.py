@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.additions import Forms, with_additions
-from friction_ocp.diagnosis.excess import DOUBTED
+from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.footing import Footing, training_pieces
 from friction_ocp.diagnosis.kinks import freed
@@ -90,7 +90,7 @@ def explains_more(
     """
     left = innovations(final)
     if not accepted:
-        return left_over and innovations(base).ratio - 1.0 < (1.0 - OF_REST) * left.beyond
+        return left_over and innovations(base).ratio <= _notably_less(left)
     but_last = _ratio_with(base, accepted[:-1], final, forms)
     fewer = ([other for other in accepted if other != key] for key in accepted[:-1])
     enough = left.ratio * DOUBTED
@@ -98,7 +98,7 @@ def explains_more(
         return True
     if not left_over:
         return False
-    if but_last < left.ratio or _ratio_as(base, final) - 1.0 < (1.0 - OF_REST) * left.beyond:
+    if but_last < left.ratio or _ratio_as(base, final) <= _notably_less(left):
         return True
     return any(
         _ratio_with(base, accepted[:k], final, forms) < _ratio_with(stated, accepted[: k + 1], final, forms)
@@ -115,8 +115,16 @@ def leaves_less(read: FittedModel, stated: FittedModel, fewer: bool) -> bool:
     foot = replace(stated.footing, train=training_pieces(read.model))
     again = _begun_at(read, read.model, foot, read.theta)
     left = innovations(stated)
-    most = DOUBTED * left.ratio if fewer else 1.0 + (1.0 - OF_REST) * left.beyond
+    most = DOUBTED * left.ratio if fewer else _notably_less(left)
     return again.holds and innovations(again).ratio <= most
+
+
+def _notably_less(left: Excess) -> float:
+    """Return the power of innovations that is notably less than what is left: the rest of it beyond noise is gone.
+
+    Where there is none, and a slow torque alone shows that something is missing, floors are in doubt as far.
+    """
+    return 1.0 + (1.0 - OF_REST) * left.beyond if left.beyond > 0.0 else left.ratio / DOUBTED
 
 
 def is_needless(stated: FittedModel, final: FittedModel) -> bool:

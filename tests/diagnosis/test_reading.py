@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ import yaml
 from diagnosis_cases import COULOMB, ENCODER_STEP, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, plain_drive, write_case
 from plant import Plant, PlantController, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Trajectory
 
+from friction_ocp.diagnosis import reading
 from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.diagnose import Diagnosis, diagnose
+from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis_document import diagnosis_document
 from friction_ocp.execution.executor import InProcess
 from friction_ocp.problem_file.load import load_problem
@@ -114,3 +118,20 @@ def test_what_was_fitted_beside_the_refits_is_what_is_fitted_when_asked_for(tmp_
         assert read.drive == same.drive
         np.testing.assert_allclose(base.theta, expected.theta, rtol=1e-12)
         assert base.objective == pytest.approx(expected.objective, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("left", "read", "more"), [(1.5, 1.4, False), (1.5, 1.2, True), (0.902, 0.903, False), (0.902, 0.8, True)]
+)
+def test_another_reading_has_to_leave_notably_less(
+    left: float, read: float, more: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where stated floors are too high, and a slow torque alone shows that something is missing."""
+
+    def power(fitted: Any) -> Excess:
+        return Excess(float(fitted.power), 0.5)
+
+    monkeypatch.setattr(reading, "innovations", power)
+    stated, other = (cast(Any, SimpleNamespace(power=ratio)) for ratio in (left, read))
+    assert reading.explains_more(other, stated, stated, (), {}, True) == more
+    assert not reading.explains_more(other, stated, stated, (), {}, False)
