@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.led_back import led_back
 from friction_ocp.diagnosis.polishing import loosely, polished, timed
-from friction_ocp.diagnosis.refit import MOST_OF, completed, without_addition
+from friction_ocp.diagnosis.refit import MOST_OF, completed, levelled, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_another, is_same
 from friction_ocp.diagnosis.select import Round, choose, gave_shape, turned
 from friction_ocp.diagnosis.worth import ALMOST, OF_ALL, may_grow, required, samples
@@ -116,12 +116,13 @@ def exchanged(
 ) -> tuple[FittedModel, list[Round], list[Key]]:
     """Put rivals in the place of earlier additions where, beside the later ones, they explain more for certain.
 
-    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. A rival
-    that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed again:
-    beside all that was missing then a small difference looked like a large one. Once the search is `exhausted` nothing
-    is fitted again beside what has taken another's place.
+    Alone they were further off: two effects are more than each of them, and what is nearest to both is neither. What
+    explains nearly as much begins again from the node states of the better of the two: kinks tell nothing apart. A
+    rival that explains the same with fewer parameters takes the place, too. Where there is none the rivals are weighed
+    again: beside all that was missing then a small difference looked like a large one. Once the search is `exhausted`
+    nothing is fitted again beside what has taken another's place.
     """
-    done, current, benchmark = list(rounds), bench.current, Benchmark(bench.current)
+    done, current, benchmark, began = list(rounds), bench.current, Benchmark(bench.current), accepted
     wanted = dict[tuple[Key, Key], _Wanted]()
     for index, item in enumerate(done[:-1]):
         held = item.accepted
@@ -141,7 +142,7 @@ def exchanged(
             rival = others.pop(0)
             seen.add(rival.key)
             keys = made[rival.key] = _swapped(accepted, held.key, rival.key)
-            if current is bench.current and (held.key, rival.key) in known:
+            if accepted == began and (held.key, rival.key) in known:
                 swapped = known[held.key, rival.key]
             elif exhausted():
                 break
@@ -150,6 +151,10 @@ def exchanged(
                 swapped = _fitted(bench, current, drive, rival.standing.values)
             if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
                 continue
+            known_as, (current, swapped) = current, levelled(current, swapped, item.before.cost)
+            if current is not known_as:
+                benchmark = Benchmark(current)
+                tried = gaining(tried, benchmark)
             gains = -benchmark.dearer(swapped)
             if benchmark.yields(swapped, gains, level, rng):
                 seen.add(held.key)

@@ -22,6 +22,8 @@ from friction_ocp.simulation.grid import FloatArray
 
 SIZES = (1.0, 0.3, 3.0, 10.0)
 """Sizes over the predicted one that are simulated, itself first: under a large misfit predictions fall short."""
+NEARLY = 0.01
+"""Share of what one model explains by which another falls short of it at most where kinks alone may make that."""
 MOST_OF = 0.5
 """Share of a misfit short of which a small effect has not explained it, and a large one is tried."""
 NUDGES, NUDGE, CLOSE_BY = 2, 0.05, 1.2
@@ -159,6 +161,22 @@ def begun_beside(fitted: FittedModel, nodes: Sequence[FloatArray]) -> FittedMode
         return fitted
     again = polished(fitted.model, fitted.footing, fitted.theta, tuple(nodes))
     return again if again.objective < fitted.objective - UNIMPORTANT else fitted
+
+
+def levelled(one: FittedModel, other: FittedModel, without: float) -> tuple[FittedModel, FittedModel]:
+    """Return two models, the worse begun again from the node states of the better and that from those of what is then.
+
+    The same where one explains notably more of what a model `without` either costs.
+    """
+    for _ in range(2):
+        better, worse = sorted((one, other), key=lambda fitted: fitted.cost)
+        if worse.cost - better.cost > NEARLY * (without - better.cost):
+            break
+        again = begun_beside(worse, better.linear.point.nodes)
+        one, other = (again if fitted is worse else fitted for fitted in (one, other))
+        if again.cost >= better.cost:
+            break
+    return one, other
 
 
 def nudged(fitted: FittedModel, seed: int) -> FittedModel:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from diagnosis_cases import COULOMB, INERTIA, TORQUE_CONSTANT, VISCOUS, axis, write_case
 from plant import PlantFriction, PlantRipple
 
-from friction_ocp.diagnosis import reexamine
+from friction_ocp.diagnosis import reexamine, refit
 from friction_ocp.diagnosis.bench import Bench, open_bench
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.diagnose import diagnose
@@ -199,3 +201,33 @@ def test_what_has_its_more_general_shape_may_still_do_the_work_of_two(tmp_path: 
     current, _, kept = exchanged(bench, rounds, accepted, LEVEL, np.random.default_rng(0), HERE)
     assert kept == [wave, wave] and "motor.gravity.torque" not in current.values
     assert not excess(current.linear.rows, current.blocks).significant(LEVEL)
+
+
+@pytest.mark.parametrize(
+    ("costs", "ends", "wanted"),
+    [
+        ((100.0, 104.0), {"b": 99.5}, [("b", "a"), ("a", "b")]),
+        ((100.0, 104.0), {"b": 100.0}, [("b", "a")]),
+        ((104.0, 100.0), {"a": 101.0}, [("a", "b")]),
+        ((100.0, 130.0), {}, []),
+    ],
+)
+def test_what_explains_nearly_as_much_begins_where_the_better_has_its_nodes(
+    costs: tuple[float, float], ends: dict[str, float], wanted: list[tuple[str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the other way round once that is better; of 1000 that a model costs without either."""
+    asked = list[tuple[str, str]]()
+
+    def model(name: str, cost: float) -> Any:
+        return SimpleNamespace(name=name, cost=cost, linear=SimpleNamespace(point=SimpleNamespace(nodes=name)))
+
+    def begun(fitted: Any, nodes: str) -> Any:
+        asked.append((fitted.name, nodes))
+        end = ends.get(fitted.name, fitted.cost)
+        return model(fitted.name, end) if end < fitted.cost else fitted
+
+    monkeypatch.setattr(refit, "begun_beside", begun)
+    one, other = refit.levelled(model("a", costs[0]), model("b", costs[1]), 1000.0)
+    assert asked == wanted
+    assert (one.name, other.name) == ("a", "b")
+    assert (one.cost, other.cost) == (ends.get("a", costs[0]), ends.get("b", costs[1]))
