@@ -13,6 +13,7 @@ from plant import Plant, PlantFriction, PlantMotor, PlantSensor, PlantShaft, Pla
 from swinging import swung
 
 from friction_ocp.estimation.first_nodes import suggested_point
+from friction_ocp.estimation.fit import settled
 from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.model import Model, prepare_fit
 from friction_ocp.estimation.progress import Phases, silent
@@ -110,6 +111,37 @@ def test_short_ones_lead_to_the_truth(model: Model, stuck: Fitted) -> None:
     assert found.solution.objective < 1e-5 * stuck.solution.objective
     assert found.solution.iterations > stuck.solution.iterations
     assert found.solution.point.theta == pytest.approx(_truth(model), rel=0.01)
+
+
+@pytest.mark.parametrize("level", [1e-3, 1e-2])
+def test_segments_of_few_samples_lead_where_loose_noise_joins_long_ones(level: float, model: Model) -> None:
+    """Stated far too large, it lets every segment stick and slide on its own, and the end is none of a right model."""
+    loose = _joined_by(model, process_noise={"load": level})
+    program = joined(loose, 0.0, Squares())
+    start = suggested_point(program, loose.space.guess)
+    stuck = Fitted(
+        solve_gauss_newton(program, start, limits(loose), Phases(silent, 1).begin("fit")),
+        program,
+    )
+    found = through_short_segments(loose, stuck, Phases(silent, 5))
+    assert found.program is program
+    assert found.solution.objective < 0.1 * stuck.solution.objective
+    assert found.solution.point.theta == pytest.approx(_truth(model), rel=0.01)
+
+
+def test_noise_that_is_asked_for_is_not_what_a_stuck_fit_leaves(model: Model) -> None:
+    """The load has none: what is found is a thousandth of its friction from sample to sample."""
+    asked = _joined_by(model, estimated_noise=("load",))
+    after, fitted = settled(asked)
+    assert fitted.solution.point.theta == pytest.approx(_truth(model), rel=0.01)
+    (level,) = after.noise_levels
+    assert level.value / np.sqrt(STEP) < 1e-3 * TRUTH["load.friction.tau_c"]
+
+
+def _joined_by(model: Model, **options: Any) -> Model:
+    """Return the model with segments that torque noise joins."""
+    problem = model.problem
+    return prepare_fit(replace(problem, estimation=replace(problem.estimation, fit="relaxed", **options)))
 
 
 def test_what_ends_at_the_noise_stays(model: Model, stuck: Fitted) -> None:
