@@ -262,7 +262,8 @@ def _others(bench: Bench, item: Round, accepted: Sequence[Key], seen: Collection
 def _fitted(bench: Bench, current: FittedModel, drive: Drive, alone: Mapping[str, float]) -> FittedModel:
     """Fit a drive with some additions, from where one of them ended by itself and what the others are now.
 
-    Or from where all but that one are now, if that is nearer, or from where loosely joined segments lead free runs.
+    Or from where all but that one are now, if that is nearer, or from where loosely joined segments lead free runs, or
+    with the segments of the current model, where they are of the same kind: on their own they may stick otherwise.
     """
     model = with_drive(bench.base.model, drive)
     starts = [{**current.values, **alone}, {**alone, **current.values}]
@@ -270,6 +271,9 @@ def _fitted(bench: Bench, current: FittedModel, drive: Drive, alone: Mapping[str
     if bench.base.footing.segment_s is None:
         begins.append(loosely(model, starts[0]))
     ends = [polished(model, bench.base.footing, theta, None) for theta in begins]
+    nodes = current.linear.point.nodes
+    if ends[0].footing.joined and [one.shape for one in nodes] == [one.shape for one in ends[0].linear.point.nodes]:
+        ends.append(polished(model, bench.base.footing, begins[0], nodes))
     best = min(ends, key=lambda end: end.objective)
     return best if best.astray and not current.astray else completed(best)
 
