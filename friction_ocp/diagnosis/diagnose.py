@@ -13,7 +13,7 @@ from friction_ocp.diagnosis.aside import OtherReadings
 from friction_ocp.diagnosis.bench import open_bench
 from friction_ocp.diagnosis.blind_spots import BlindSpot, blind_spots
 from friction_ocp.diagnosis.crew import screen_candidate
-from friction_ocp.diagnosis.excess import DOUBTED, Excess
+from friction_ocp.diagnosis.excess import Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.free_gap import FreeErrors, Shrink, comes_closer, free_errors, shrink
 from friction_ocp.diagnosis.hindsight import doubted, merged, standing
@@ -26,7 +26,7 @@ from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stand_ins import takes_almost_all
-from friction_ocp.diagnosis.stated import contradictions, corrected
+from friction_ocp.diagnosis.stated import can_contradict, contradictions, corrected
 from friction_ocp.diagnosis.straying import DRAWS, strays_as_far
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import Key
@@ -324,8 +324,7 @@ def _checked(
     rounds = list[Round]()
     for _ in range(MOST_PARTS):
         power = innovations(current)
-        noise = not power.significant(level) and power.ratio <= DOUBTED
-        found = contradictions(current) if noise else []
+        found = contradictions(current) if can_contradict(current, power, level) else []
         if found and not rounds:
             again = begun_again(current, base.model.space)
             if again.objective < current.objective - UNIMPORTANT:

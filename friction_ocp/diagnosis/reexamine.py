@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.led_back import led_back
 from friction_ocp.diagnosis.polishing import loosely, polished, timed
-from friction_ocp.diagnosis.refit import MOST_OF, completed, levelled, without_addition
+from friction_ocp.diagnosis.refit import MOST_OF, completed, levelled, with_nodes_of, without_addition
 from friction_ocp.diagnosis.rival import Rival, is_another, is_same
 from friction_ocp.diagnosis.select import Round, choose, gave_shape, turned
 from friction_ocp.diagnosis.worth import ALMOST, OF_ALL, may_grow, required, samples
@@ -271,8 +271,8 @@ def _fitted(bench: Bench, current: FittedModel, drive: Drive, alone: Mapping[str
     if bench.base.footing.segment_s is None:
         begins.append(loosely(model, starts[0]))
     ends = [polished(model, bench.base.footing, theta, None) for theta in begins]
-    nodes = current.linear.point.nodes
-    if ends[0].footing.joined and [one.shape for one in nodes] == [one.shape for one in ends[0].linear.point.nodes]:
+    nodes = with_nodes_of(ends[0], current.linear.point.nodes)
+    if nodes is not None:
         ends.append(polished(model, bench.base.footing, begins[0], nodes))
     best = min(ends, key=lambda end: end.objective)
     return best if best.astray and not current.astray else completed(best)

@@ -155,19 +155,29 @@ def begun_beside(fitted: FittedModel, nodes: Sequence[FloatArray]) -> FittedMode
     """Fit again from the node states of another model, if that is better; the same where they are of another kind.
 
     Exact friction lets every short segment stick or slide, and ends differ by which of them do: two models that say the
-    same in other words would seem to be told apart by that. Where in between the current of a motor is stays as it is:
-    one that lags behind a command with an offset is off by that, too.
+    same in other words would seem to be told apart by that.
+    """
+    begun = with_nodes_of(fitted, nodes)
+    if begun is None:
+        return fitted
+    again = polished(fitted.model, fitted.footing, fitted.theta, begun)
+    return again if again.objective < fitted.objective - UNIMPORTANT else fitted
+
+
+def with_nodes_of(fitted: FittedModel, nodes: Sequence[FloatArray]) -> tuple[FloatArray, ...] | None:
+    """Return where segments of a model begin if they do so as those of another; None where they are of another kind.
+
+    What a motor makes of its command stays its own: behind one with an offset it is off by that.
     """
     own = fitted.linear.point.nodes
     if not fitted.footing.joined or [one.shape for one in nodes] != [one.shape for one in own]:
-        return fitted
+        return None
     drive = fitted.model.drive
-    apart = [drive.state_names.index(name) for name in drive.mechanism.following_names]
+    behind = [drive.state_names.index(name) for name in drive.mechanism.following_names]
     begun = tuple(one.copy() for one in nodes)
     for one, known in zip(begun, own, strict=True):
-        one[:, apart] = known[:, apart]
-    again = polished(fitted.model, fitted.footing, fitted.theta, begun)
-    return again if again.objective < fitted.objective - UNIMPORTANT else fitted
+        one[:, behind] = known[:, behind]
+    return begun
 
 
 def levelled(one: FittedModel, other: FittedModel, without: float) -> tuple[FittedModel, FittedModel]:

@@ -10,6 +10,7 @@ import numpy as np
 from friction_ocp.diagnosis.benchmark import Benchmark
 from friction_ocp.diagnosis.blocks import stats
 from friction_ocp.diagnosis.clues import clues_of
+from friction_ocp.diagnosis.excess import DOUBTED, Excess
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.options import Considered
@@ -26,7 +27,9 @@ from friction_ocp.effects.effect import Augmentation, Key
 from friction_ocp.effects.registry import effects
 from friction_ocp.effects.stated_values import STATED
 from friction_ocp.effects.torques import mode_of
+from friction_ocp.estimation.drive_noise import input_floor
 from friction_ocp.estimation.model import with_drive
+from friction_ocp.estimation.torque_noise import driving
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
 
@@ -44,6 +47,21 @@ class Contradiction:
     """Parameters that lie too far away."""
     deviations: float
     """The largest distance, in prior deviations."""
+
+
+def can_contradict(fitted: FittedModel, left: Excess, level: float) -> bool:
+    """Whether what is `left` is noise as it is known: the distances of fitted values from stated ones count then.
+
+    More is a gap. And less where nobody states the noise of a measured input: a loop that follows the counts of an
+    encoder throws its command to and fro, and that is no noise. With gaps laid for so much of it a rotor looks too
+    light.
+    """
+    if left.significant(level) or left.ratio > DOUBTED:
+        return False
+    model = fitted.model
+    inputs = [channel for _, channel, _ in driving(model.problem.drive, {})]
+    stated = all(input_floor(model, channel).source in ("noise_std", "resolution") for channel in inputs)
+    return stated or not any(fitted.footing.density.values()) or left.ratio * DOUBTED >= 1.0
 
 
 def contradictions(fitted: FittedModel) -> list[Contradiction]:

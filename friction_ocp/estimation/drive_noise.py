@@ -14,7 +14,7 @@ from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.gathered_noise import motions_of, slopes_about, unit_covariances
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.noise import noise_floor
+from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.torque_noise import QUARTERS, acceleration_noise, driving, input_power, seen_variance
 from friction_ocp.simulation.grid import FloatArray
 
@@ -96,9 +96,15 @@ def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
     signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
     step = float(np.median(np.diff(signals[0].time)))
     size = max(float(np.sqrt(np.nanmean(item.values**2))) for item in signals)
-    floor = noise_floor(channel, [(item.time, item.values) for item in signals])
+    floor = input_floor(model, channel)
     known = 0.0 if floor.source == "high_frequency" and floor.std > MORE_THAN_ALL * size else floor.std
     return max(known, NUMERICAL_INPUT * size), step
+
+
+def input_floor(model: Model, channel: Channel) -> NoiseFloor:
+    """Return the noise floor of an input, as stated or as its samples show it."""
+    signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
+    return noise_floor(channel, [(item.time, item.values) for item in signals])
 
 
 def group_inertias(mech: Mechanism, numbers: Mapping[str, float]) -> FloatArray:
