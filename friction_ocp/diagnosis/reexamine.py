@@ -151,9 +151,9 @@ def exchanged(
                 swapped = _fitted(bench, current, drive, rival.standing.values)
             if swapped is None or not swapped.holds or is_another(rival.screened, swapped):
                 continue
-            known_as, (current, swapped) = current, levelled(current, swapped, item.before.cost)
-            if current is not known_as:
-                benchmark = Benchmark(current)
+            better, swapped = levelled(current, swapped, item.before.cost)
+            if better is not current:
+                current, benchmark = better, Benchmark(better)
                 tried = gaining(tried, benchmark)
             gains = -benchmark.dearer(swapped)
             if benchmark.yields(swapped, gains, level, rng):

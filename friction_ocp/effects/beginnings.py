@@ -9,7 +9,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.effects.effect import Clues, Track, fitted_friction
-from friction_ocp.effects.periods import CHANCE, FEWEST, SHARED, stats
+from friction_ocp.effects.periods import FEWEST, are_apart
 from friction_ocp.effects.spectrum import without
 from friction_ocp.simulation.grid import FloatArray
 
@@ -57,15 +57,12 @@ def begins_apart(drive: Drive, place: str, clues: Clues) -> Beginnings | None:
     shared, apart = list[float](), list[tuple[float, float, FloatArray]]()
     for constant in longest * np.geomspace(SHORTEST, LONGEST, LOOKED_AT):
         fading: FloatArray = without((friction * np.exp(-time / constant))[:, None] * own, made_up_for)
-        sizes = np.linalg.lstsq(fading, lacking, rcond=None)[0].astype(np.float64)
-        apart.append((_taken(fading, lacking), float(constant), sizes))
-        shared.append(_taken(fading.sum(axis=1, keepdims=True), lacking))
+        taken, sizes = _fitted(fading, lacking)
+        apart.append((taken, float(constant), sizes))
+        shared.append(_fitted(fading.sum(axis=1, keepdims=True), lacking)[0])
     most, constant, sizes = max(apart, key=lambda one: one[0])
-    more = int(present.size) - 1
-    left = lacking.size - made_up_for.shape[1] - present.size - 1
-    noise = (float(np.sum(lacking**2)) - most) / max(left, 1)
-    chance = float(stats.f.sf((most - max(shared)) / more / max(noise, 1e-300), more, max(left, 1)))
-    if chance >= CHANCE or max(shared) >= SHARED * (most - more * noise):
+    left = int(lacking.size - made_up_for.shape[1] - present.size - 1)
+    if not are_apart(max(shared), most, float(np.sum(lacking**2)), int(present.size) - 1, left):
         return None
     furthest = sizes[np.argmax(np.abs(sizes))]
     return Beginnings(constant, {name: float(1.0 - size / furthest) for name, size in zip(names, sizes, strict=True)})
@@ -83,5 +80,7 @@ def _curve(drive: Drive, place: str, clues: Clues, track: Track) -> FloatArray:
     return np.sign(omega) * np.where(omega > 0.0, forwards, backwards)
 
 
-def _taken(columns: FloatArray, values: FloatArray) -> float:
-    return float(np.sum((columns @ np.linalg.lstsq(columns, values, rcond=None)[0]) ** 2))
+def _fitted(columns: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
+    """Return what columns take of the sum of squares of values, and their sizes."""
+    sizes = np.linalg.lstsq(columns, values, rcond=None)[0].astype(np.float64)
+    return float(np.sum((columns @ sizes) ** 2)), sizes

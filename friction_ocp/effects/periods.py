@@ -121,10 +121,20 @@ def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[flo
     differing, own = _strongest(each, frequency, step)
     more = 2 * (len(each) - 1)
     left = sum(one.place.size for one in each) - more - 3
-    noise = (sum(float(np.sum(one.beyond**2)) for one in each) - own) / max(left, 1)
-    chance = float(stats.f.sf((own - shared) / more / max(noise, 1e-300), more, max(left, 1)))
-    apart = chance < CHANCE and shared < SHARED * (own - more * noise) and _of_one_size(each, differing)
+    whole = sum(float(np.sum(one.beyond**2)) for one in each)
+    apart = are_apart(shared, own, whole, more, left) and _of_one_size(each, differing)
     return (differing, True) if apart else (alike, False)
+
+
+def are_apart(shared: float, own: float, whole: float, more: int, left: int) -> bool:
+    """Whether recordings show that what they lack is not the same in all: by an F test, and by how much that takes.
+
+    Of the `whole` sum of squares it takes `shared`, and with `more` parameters, `left` degrees of freedom remaining,
+    its `own` in each.
+    """
+    noise = (whole - own) / max(left, 1)
+    chance = float(stats.f.sf((own - shared) / more / max(noise, 1e-300), more, max(left, 1)))
+    return chance < CHANCE and shared < SHARED * (own - more * noise)
 
 
 def _of_one_size(each: Sequence[Seen], frequency: float) -> bool:

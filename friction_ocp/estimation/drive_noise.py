@@ -16,6 +16,7 @@ from friction_ocp.estimation.gathered_noise import motions_of, slopes_about, uni
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.torque_noise import QUARTERS, acceleration_noise, driving, input_power, seen_variance
+from friction_ocp.recording import recording
 from friction_ocp.simulation.grid import FloatArray
 
 NUMERICAL_INPUT = 1e-3
@@ -93,7 +94,7 @@ def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
 
     High frequencies of an input that a loop throws from one end to the other, sample by sample, are its motion.
     """
-    signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
+    signals = _recorded(model, channel)
     step = float(np.median(np.diff(signals[0].time)))
     size = max(float(np.sqrt(np.nanmean(item.values**2))) for item in signals)
     floor = input_floor(model, channel)
@@ -103,8 +104,11 @@ def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
 
 def input_floor(model: Model, channel: Channel) -> NoiseFloor:
     """Return the noise floor of an input, as stated or as its samples show it."""
-    signals = [use.recording.channels[channel.name] for use in model.problem.recordings]
-    return noise_floor(channel, [(item.time, item.values) for item in signals])
+    return noise_floor(channel, [(item.time, item.values) for item in _recorded(model, channel)])
+
+
+def _recorded(model: Model, channel: Channel) -> list[recording.Channel]:
+    return [use.recording.channels[channel.name] for use in model.problem.recordings]
 
 
 def group_inertias(mech: Mechanism, numbers: Mapping[str, float]) -> FloatArray:

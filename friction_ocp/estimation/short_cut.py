@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from friction_ocp.estimation.drive_noise import made_by_inputs, within
 from friction_ocp.estimation.first_nodes import suggested_point
-from friction_ocp.estimation.gauss_newton import Solution, solve_gauss_newton
+from friction_ocp.estimation.gauss_newton import solve_gauss_newton
 from friction_ocp.estimation.horizon import is_relaxed
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.preparation import joined_by_input_noise, may_be_joined_by_inputs
@@ -67,16 +68,14 @@ def _by_way_of(model: Model, ways: list[Program], fitted: Fitted, phases: Phases
     """
     if not ways:
         return fitted
-    program, best, between = fitted.program, fitted.solution, list[Solution]()
-    for k, short in enumerate(ways):
-        if k == 0:
-            points = [suggested_point(short, theta) for theta in (model.space.guess, best.point.theta)]
-        else:
-            points = [short.point_along(ways[k - 1], between[-1].point)]
+    program, best = fitted.program, fitted.solution
+    points, iterations = [suggested_point(ways[0], theta) for theta in (model.space.guess, best.point.theta)], 0
+    for short, longer in pairwise([*ways, program]):
         watch, enough = phases.begin("short segments"), partial(is_noise, short)
-        between.append(race(short, points, COARSE, watch, solve_gauss_newton, enough)[0])
+        end = race(short, points, COARSE, watch, solve_gauss_newton, enough)[0]
+        points, iterations = [longer.point_along(short, end.point)], iterations + end.iterations
     watch = phases.begin("long segments again")
-    end = final_solver(model)(program, program.point_along(ways[-1], between[-1].point), limits(model), watch)
-    iterations = best.iterations + sum(item.iterations for item in between) + end.iterations
+    end = final_solver(model)(program, points[0], limits(model), watch)
+    iterations += best.iterations + end.iterations
     better = min(best, end, key=lambda solution: solution.objective)
     return replace(fitted, solution=replace(better, iterations=iterations))
