@@ -88,6 +88,17 @@ _NEVER_SO_LARGE = re.compile(
 )
 _COUNTS = ("count", "counts")
 
+_LETTERS = r"A-Za-zµμ"
+_SPELLINGS = (
+    (re.compile(rf"(?<![{_LETTERS}])Grad(?![{_LETTERS}])"), "deg"),
+    (re.compile(rf"(?<![{_LETTERS}])(?:U|r|tr)/min(?![{_LETTERS}])"), "rpm"),
+    (re.compile(rf"(?<![{_LETTERS}])([ckmuµμn]?N)([cm]?m)(?![{_LETTERS}])"), r"\1 \2"),
+    (re.compile(rf"(?<![{_LETTERS}])(k?g)([cm]?m)(?=\^|²|\*\*)"), r"\1 \2"),
+    (re.compile(rf"(?<![{_LETTERS}])(oz|lb)f?[- ](in|ft)(?![{_LETTERS}])"), r"\1f \2"),
+    (re.compile(rf"(?<![{_LETTERS}])(in|ft)[- ](oz|lb)f?(?![{_LETTERS}])"), r"\2f \1"),
+)
+"""Other spellings of what pint knows; an ounce or a pound over a length is a force there."""
+
 # The radian is a dimension of its own here, so that rad/s, Hz and 1/s, or N m and N m/rad, stay apart.
 _UNIT_DEFINITIONS = """
 giga- = 1e9 = G-
@@ -104,6 +115,7 @@ ampere = [current] = A = amp
 kelvin = [temperature]; offset: 0 = K
 radian = [angle] = rad
 percent = 0.01
+permille = 0.001
 minute = 60 * second = min
 hour = 60 * minute = h = hr
 degree = 0.017453292519943295 * radian = deg = °
@@ -114,6 +126,12 @@ turn = 360 * degree = _ = revolution = rev
 rpm = turn / minute
 hertz = 1 / second = Hz
 newton = kilogram * meter / second ** 2 = N
+inch = 0.0254 * meter = in
+foot = 12 * inch = ft
+standard_gravity = 9.80665 * meter / second ** 2 = g_n
+kilogram_force = 9.80665 * newton = kgf
+pound_force = 4.4482216152605 * newton = lbf
+ounce_force = pound_force / 16 = ozf
 joule = newton * meter = J
 watt = joule / second = W
 volt = watt / ampere = V
@@ -248,12 +266,12 @@ def _root_factor(unit: str) -> float:
 
 
 def _spelling(unit: str) -> str:
-    """Return a unit in the spelling of pint: Nm is N m, % is percent, Grad is the German degree, 1 is nothing."""
-    text = (
-        unit.strip().replace("sqrt(Hz)", "Hz^0.5").replace("%", "percent").replace("°C", "degC").replace("RPM", "rpm")
-    )
-    text = re.sub(r"(?<![A-Za-z])Grad(?![A-Za-z])", "deg", text)
-    text = re.sub(r"(?<![A-Za-zµμ])([kmuµμn]?)Nm(?![A-Za-z])", r"\1N m", text)
+    """Return a unit in the spelling of pint: Nm is N m, % is percent, U/min is rpm, 1 is nothing."""
+    text = unit.strip()
+    for theirs, ours in (("sqrt(Hz)", "Hz^0.5"), ("%", "percent"), ("‰", "permille"), ("°C", "degC"), ("RPM", "rpm")):
+        text = text.replace(theirs, ours)
+    for pattern, ours in _SPELLINGS:
+        text = pattern.sub(ours, text)
     return "" if text in _WITHOUT_UNIT else text
 
 

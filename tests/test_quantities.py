@@ -51,6 +51,21 @@ CONVERSIONS = [
     ("N m/deg", 180.0 / np.pi, "N m/rad"),
     ("V/rpm", 60.0 / (2.0 * np.pi), "V s/rad"),
     ("mH", 1e-3, "H"),
+    ("U/min", 2.0 * np.pi / 60.0, "rad/s"),
+    ("tr/min", 2.0 * np.pi / 60.0, "rad/s"),
+    ("mV/(r/min)", 1e-3 * 60.0 / (2.0 * np.pi), "V s/rad"),
+    ("Ncm", 1e-2, "N m"),
+    ("Nmm", 1e-3, "N m"),
+    ("gcm^2", 1e-7, "kg m^2"),
+    ("kgcm²", 1e-4, "kg m^2"),
+    ("‰", 1e-3, "1"),
+    ("in/s", 0.0254, "m/s"),
+    ("lbf", 4.4482216152605, "N"),
+    ("oz-in", 4.4482216152605 * 0.0254 / 16.0, "N m"),
+    ("oz-in/A", 4.4482216152605 * 0.0254 / 16.0, "N m/A"),
+    ("ft-lb", 4.4482216152605 * 0.3048, "N m"),
+    ("kgf cm", 0.0980665, "N m"),
+    ("mg_n", 9.80665e-3, "m/s^2"),
 ]
 
 
@@ -122,8 +137,8 @@ def test_si_unit_follows_the_motion() -> None:
         si_unit("tork")
 
 
-MISTAKEN = ["Mrad", "Grads", "Mm", "Mm/s", "Gdeg", "1/Ms", "mm/Ms", "megameter", "kN/Mm"]
-"""Units with a prefix that nobody means."""
+MISTAKEN = ["Mrad", "Grads", "Mm", "Mm/s", "Gdeg", "1/Ms", "mm/Ms", "megameter", "kN/Mm", "oz-in^2"]
+"""Units with a prefix that nobody means, and a mass in ounces, which would read as a force."""
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,11 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv_cells import is_missing, is_number, joined, no_number, numbers
 from friction_ocp.recording.csv_layout import Layout, sniff_layout
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, no_clock
+from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_sizes, instant, no_clock
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
+from friction_ocp.recording.stamps import past_midnight, seconds_of
 
 _ROWS_AT_ONCE = 50_000
 _TOLD = 10
@@ -36,20 +37,26 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
     layout = sniff_layout(path, stated.delimiter, stated.decimal)
     rows, summary = _estimated_rows(path), f"delimiter {layout.delimiter!r}"
     headed = zip(layout.names, layout.units, strict=True)
-    signals = [Signal(name, rows, header_unit(name) or unit) for name, unit in headed]
+    signals = [
+        Signal(name, rows, "s" if column in layout.stamped else header_unit(name) or unit)
+        for column, (name, unit) in enumerate(headed)
+    ]
+    origin = instant(layout.origin) if layout.origin else ""
     if import_map is not None:
         read = partial(_read_columns, path, layout, import_map.decimal)
-        yield ForeignFile(tuple(signals), read, no_clock, summary)
+        yield ForeignFile(tuple(signals), read, no_clock, summary, origin)
         return
     check_sizes(path, signals)
     odd = _OddRows(len(layout.names))
     values, hint = _whatever_is_a_number(path, layout, odd)
+    for column, dated in layout.stamped.items():
+        values[column] = values[column] if dated else past_midnight(values[column])
     known = [
         replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
         for signal, column in zip(signals, values, strict=True)
     ]
     yield ForeignFile(
-        tuple(known), lambda wanted: {k: values[k] for k in wanted}, no_clock, summary + hint + odd.summary
+        tuple(known), lambda wanted: {k: values[k] for k in wanted}, no_clock, summary + hint + odd.summary, origin
     )
 
 
@@ -77,10 +84,21 @@ def _numbers_of_all(path: Path, layout: Layout, decimal: str | None, odd: _OddRo
     chunks: list[FloatArray] = []
     commas = False
     for _, columns in _chunks(path, layout, range(odd.width), odd):
-        found = [numbers(cells, decimal) for cells in columns]
+        found = [_values(layout, column, cells, decimal) for column, cells in enumerate(columns)]
         chunks.append(np.array([values for values, _ in found], dtype=np.float64))
         commas = commas or any("," in cells[row] for cells, (_, bad) in zip(columns, found, strict=True) for row in bad)
     return np.concatenate(chunks, axis=1) if chunks else np.empty((odd.width, 0)), commas
+
+
+def _values(layout: Layout, column: int, cells: Sequence[str], decimal: str | None) -> tuple[Values, list[int]]:
+    """Return the numbers in cells of a column, dates as s, and the rows of cells that are neither."""
+    return seconds_of(cells, layout.origin) if column in layout.stamped else numbers(cells, decimal)
+
+
+def _fault(layout: Layout, column: int, where: str, place: str, cell: str, decimal: str | None) -> Finding:
+    if column in layout.stamped:
+        return Finding(where, f"{place} is no date and no time of day", remedy="correct or empty the cell")
+    return no_number(where, place, cell, decimal)
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
@@ -167,12 +185,14 @@ def _read_columns(path: Path, layout: Layout, decimal: str | None, indices: Sequ
     pieces: dict[int, list[Values]] = {index: [] for index in indices}
     for lines, columns in _chunks(path, layout, indices, odd):
         for index, cells in zip(indices, columns, strict=True):
-            values, bad = numbers(cells, decimal)
+            values, bad = _values(layout, index, cells, decimal)
             pieces[index].append(values)
             for row in bad[: max(0, _TOLD - len(findings))]:
                 place = f"line {lines[row]}: '{cells[row].strip()}' in column '{layout.names[index]}'"
-                findings.append(no_number(str(path), place, cells[row].strip(), decimal))
+                findings.append(_fault(layout, index, str(path), place, cells[row].strip(), decimal))
     findings = [Finding(str(path), what, remedy="complete or remove the line") for what in odd.told] + findings
     if findings:
         raise FrictionOcpError(findings[:_TOLD])
-    return {index: joined(found) for index, found in pieces.items()}
+    times_of_day = {index for index, dated in layout.stamped.items() if not dated}
+    whole = {index: joined(found) for index, found in pieces.items()}
+    return {index: past_midnight(found) if index in times_of_day else found for index, found in whole.items()}

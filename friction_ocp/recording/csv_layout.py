@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from pathlib import Path
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv_cells import is_missing, is_number
 from friction_ocp.recording.header_unit import header_unit
+from friction_ocp.recording.stamps import are_dates, first_instant, is_stamp
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
@@ -31,6 +32,10 @@ class Layout:
     first_row: int
     """Line of the first row of numbers, from 1."""
     encoding: str
+    stamped: Mapping[int, bool]
+    """Columns of dates (true) or times of day (false)."""
+    origin: int
+    """The earliest of their first instants, ns since 1970; 0 where there are no dates."""
 
 
 def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -49,7 +54,10 @@ def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None =
         allowed = "at least two columns, separated by comma, semicolon, tab or space"
         raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
     names, units, first_row = _header(splits[best])
-    return Layout(best, names, units, first_row + 1, encoding)
+    stamps = _stamps(splits[best], len(names))
+    origin = first_instant(list(stamps.values()))
+    stamped = {column: are_dates(cells) for column, cells in stamps.items()}
+    return Layout(best, names, units, first_row + 1, encoding, stamped, origin)
 
 
 def _encoding(path: Path) -> str:
@@ -89,6 +97,13 @@ def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
         for index, cells in enumerate(rows)
         if len(cells) == width and any(map(is_number, cells)) and (is_number(cells[usual]) or is_missing(cells[usual]))
     ]
+
+
+def _stamps(rows: Sequence[Sequence[str]], width: int) -> dict[int, list[str]]:
+    """Return the cells of columns that mostly hold dates or times of day."""
+    table = [rows[index] for index in _rows_of_numbers(rows)]
+    cells = {column: [row[column] for row in table if not is_missing(row[column])] for column in range(width)}
+    return {column: stated for column, stated in cells.items() if 2 * sum(map(is_stamp, stated)) > len(stated)}
 
 
 def _count_numbers(rows: Sequence[Sequence[str]]) -> int:

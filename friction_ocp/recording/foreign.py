@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.optional_library import optional_library
-from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
@@ -42,6 +41,8 @@ class Signal:
     clock: str = ""
     """The time axis that the file itself gives it; "" where it gives none."""
     numeric: bool = True
+    text: str = ""
+    """What it says, where it is one text, such as the name of what stands beside it."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,6 @@ class ForeignFile:
 
 Opener = Callable[[Path, ImportMap | None], AbstractContextManager[ForeignFile]]
 """Opens a file of one format; the map may say how it is written."""
-
-
-def in_memory(columns: Mapping[str, Values], summary: str) -> ForeignFile:
-    """Return a file without time axes that has been read whole; a name may state the unit."""
-    names = tuple(columns)
-    signals = tuple(
-        Signal(name, len(values), header_unit(name), numeric=is_real(values)) for name, values in columns.items()
-    )
-    return ForeignFile(signals, lambda wanted: {k: columns[names[k]] for k in wanted}, no_clock, summary)
 
 
 def no_clock(name: str) -> FloatArray:

@@ -12,8 +12,9 @@ from typing import Any, cast
 import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
-from friction_ocp.recording.foreign import ForeignFile, Values, free_memory, in_memory, reading
+from friction_ocp.recording.foreign import ForeignFile, Values, free_memory, reading
 from friction_ocp.recording.import_map import ImportMap
+from friction_ocp.recording.in_memory import in_memory
 
 KIND = "JSON"
 MAX_DEPTH = 20

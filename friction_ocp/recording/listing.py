@@ -17,6 +17,8 @@ from friction_ocp.recording.sampling import held_for
 
 READ_SAMPLES = 20_000_000
 """Samples in a file up to which all values are looked at, not only the times."""
+_SHOWN = 40
+"""Characters of a text that are shown."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,8 @@ def _cells(index: int, item: Listed) -> tuple[str, ...]:
     if item.empty:
         notes.append(f"{item.empty} empty")
     if not item.signal.numeric:
-        notes = ["no numbers"]
+        text = item.signal.text[:_SHOWN].strip()
+        notes = [f"'{text}'" if text.isprintable() and text else "no numbers"]
     texts = ("" if number is None else f"{number:.6g}" for number in numbers)
     return (str(index), item.signal.name, item.signal.unit, str(item.signal.samples), *texts, ", ".join(notes))
 

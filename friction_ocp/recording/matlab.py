@@ -10,8 +10,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.recording.foreign import ForeignFile, Values, in_memory, reading, refuse_large
+from friction_ocp.recording.foreign import ForeignFile, Values, reading, refuse_large
 from friction_ocp.recording.import_map import ImportMap
+from friction_ocp.recording.in_memory import in_memory
 from friction_ocp.recording.matlab_hdf5 import is_hdf5, open_hdf5
 
 KIND = "a MATLAB file"

@@ -23,6 +23,10 @@ KIND = "an HDF5 file"
 MAX_DEPTH = 20
 MAX_COLUMNS = 200
 """Columns of a matrix that are listed; images have more and are left out."""
+REFERRED = "/#refs#/"
+"""Where MATLAB keeps what it refers to."""
+MAX_ELEMENTS = 1000
+"""Elements of a cell or struct array, and characters of a text, that are listed; longer ones are left out."""
 _UNIT_KEYS = ("unit", "units", "Unit", "Units")
 
 
@@ -43,9 +47,12 @@ def is_hdf5(path: Path) -> bool:
 
 @contextmanager
 def open_hdf5(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
-    """List the datasets of numbers by their paths, `group.name`; nothing outside the file is opened."""
+    """List the datasets of numbers by their paths, `group.name`; nothing outside the file is opened.
+
+    A cell or struct array of MATLAB has elements `name{0}`.
+    """
     with opened(path, KIND, lambda: h5py.File(path, "r")) as file:
-        series = tuple(item for item in _walk(file, "", 0))
+        series = tuple(_walk(file, "", 0, set()))
 
         def read(wanted: Sequence[int]) -> Mapping[int, Values]:
             with reading(path, KIND):
@@ -55,17 +62,43 @@ def open_hdf5(path: Path, import_map: ImportMap | None = None) -> Generator[Fore
         yield ForeignFile(tuple(item.signal for item in series), read, no_clock, summary)
 
 
-def _walk(group: Any, prefix: str, depth: int) -> Iterator[_Series]:
-    """Yield every series below a group; links out of the file and references of MATLAB are left out."""
+def _walk(group: Any, prefix: str, depth: int, seen: set[int]) -> Iterator[_Series]:
+    """Yield every series below a group; links out of the file are left out, and what MATLAB refers to is read there.
+
+    `seen` are the addresses of what has been referred to: nothing is read twice.
+    """
     for key in group:
         link = group.get(key, getlink=True)
         if not isinstance(link, h5py.HardLink) or key.startswith("#"):
             continue
-        node, name = group[key], f"{prefix}{key}"
-        if isinstance(node, h5py.Group) and depth < MAX_DEPTH:
-            yield from _walk(node, f"{name}.", depth + 1)
-        elif isinstance(node, h5py.Dataset):
-            yield from _series(node, name)
+        node = group[key]
+        if h5py.check_ref_dtype(getattr(node, "dtype", np.dtype(int))) is h5py.Reference:
+            is_cell = "MATLAB_class" in node.attrs  # each field of a struct array has references and no class
+            first, last = (f"{prefix}{key}", "") if is_cell else (prefix.removesuffix("."), f".{key}")
+            yield from _referred(node, first, last, depth, seen)
+        else:
+            yield from _below(node, f"{prefix}{key}", depth, seen)
+
+
+def _below(node: Any, name: str, depth: int, seen: set[int]) -> Iterator[_Series]:
+    if isinstance(node, h5py.Group) and depth < MAX_DEPTH:
+        yield from _walk(node, f"{name}.", depth + 1, seen)
+    elif isinstance(node, h5py.Dataset):
+        yield from _series(node, name)
+
+
+def _referred(node: Any, first: str, last: str, depth: int, seen: set[int]) -> Iterator[_Series]:
+    """Yield the elements of a cell, `name{k}`, or of one field of a struct array, `name{k}.field`."""
+    if depth >= MAX_DEPTH or node.size > MAX_ELEMENTS or node.is_virtual or node.external:
+        return
+    for index, reference in enumerate(np.ravel(node[()], order="F")):
+        target = node.file[reference] if reference else None
+        if target is None or not (target.name or "").startswith(REFERRED):
+            continue
+        address = h5py.h5o.get_info(target.id).addr
+        if address not in seen:
+            seen.add(address)
+            yield from _below(target, f"{first}{{{index}}}{last}", depth + 1, seen)
 
 
 def _series(node: Any, name: str) -> Iterator[_Series]:
@@ -85,10 +118,16 @@ def _series(node: Any, name: str) -> Iterator[_Series]:
 
 def _signal(node: Any, name: str, samples: int) -> Signal:
     unit = attribute_text(next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), ""))
-    matlab_class = node.attrs.get("MATLAB_class", b"")
-    text = matlab_class in (b"char", "char") or node.attrs.get("MATLAB_empty", 0)
-    unit = unit or header_unit(name)
-    return Signal(name, samples, unit, numeric=node.dtype.kind in "biuf" and not text)
+    is_text = node.attrs.get("MATLAB_class", b"") in (b"char", "char")
+    numeric = node.dtype.kind in "biuf" and not is_text and not node.attrs.get("MATLAB_empty", 0)
+    return Signal(name, samples, unit or header_unit(name), numeric=numeric, text=_text(node) if is_text else "")
+
+
+def _text(node: Any) -> str:
+    """Return the text of a char array of one line, which is stored as UTF-16."""
+    if node.size > MAX_ELEMENTS or node.dtype != np.uint16 or node.is_virtual or node.external:
+        return ""
+    return np.ravel(node[()]).tobytes().decode("utf-16-le", errors="replace")
 
 
 def _values(file: Any, series: _Series, path: Path) -> Values:

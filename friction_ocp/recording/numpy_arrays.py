@@ -10,8 +10,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from friction_ocp.recording.foreign import ForeignFile, Values, in_memory, reading, refuse_large
+from friction_ocp.recording.foreign import ForeignFile, Values, reading, refuse_large
 from friction_ocp.recording.import_map import ImportMap
+from friction_ocp.recording.in_memory import in_memory
 from friction_ocp.recording.matlab import matrix_columns
 
 KIND = "a NumPy file"

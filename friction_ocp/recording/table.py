@@ -251,7 +251,7 @@ def _channels(
             label, time = "time", np.asarray(import_map.step * np.arange(rows), dtype=np.float64)
         else:
             label, time = signal.clock, file.clock(signal.clock)
-        clock = next((known for known, axis in axes.items() if np.array_equal(axis, time)), None)
+        clock = next((known for known, axis in axes.items() if axis is time or np.array_equal(axis, time)), None)
         if clock is None:
             clock = _clock_name(label, axes) if axes else "time"
             axes[clock] = time

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -192,7 +193,7 @@ def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
         np.testing.assert_allclose(recording.channels["angle"].values, expected, rtol=ROUNDING)
 
 
-@pytest.mark.parametrize("unit", ["", "U/min", "-"])
+@pytest.mark.parametrize("unit", ["", "Skt", "-"])
 def test_units_that_cannot_be_read_are_refused(tmp_path: Path, unit: str) -> None:
     """A unit of the file that no exact conversion is known for is not guessed."""
     from asammdf import MDF, Signal
@@ -455,20 +456,48 @@ def test_cells_of_matlab_are_series(tmp_path: Path) -> None:
     assert "runs{0}" in shown and "runs{1}" in shown and shown.splitlines()[-1].split()[2] == "7"
 
 
-def test_struct_arrays_of_matlab_are_series(tmp_path: Path) -> None:
-    """What a scope of Simulink saves as a structure with time holds a struct for each signal."""
+def write_scope(path: Path) -> None:
+    """Write what a scope of Simulink saves as a structure with time, as MATLAB does up to version 7."""
     import scipy.io
 
     signals = np.zeros((1, 2), dtype=[("values", object), ("label", object)])
     signals[0, 0], signals[0, 1] = (angle()[:, None], "position"), (fast()[:, None] ** 2, "current")
-    scope = {"time": fast()[:, None], "signals": signals, "blockName": "bench/Scope"}
-    scipy.io.savemat(tmp_path / "run.mat", {"ScopeData": scope})
+    scipy.io.savemat(path, {"ScopeData": {"time": fast()[:, None], "signals": signals, "blockName": "bench/Scope"}})
+
+
+def write_scope_73(path: Path) -> None:
+    """Write the same as MATLAB 7.3 does: the fields of a struct array are references; some here have no end."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        scope, signals = file.create_group("ScopeData"), file.create_group("ScopeData/signals")
+        scope["time"] = fast()[None, :]
+        names = [np.frombuffer(name.encode("utf-16-le"), np.uint16)[:, None] for name in ("position", "current")]
+        fields = {"values": [angle()[None, :], fast()[None, :] ** 2], "label": names}
+        for field, (first, second) in fields.items():
+            kept = [file.create_dataset(f"#refs#/{field}{k}", data=data) for k, data in enumerate((first, second))]
+            signals.create_dataset(field, (2, 1), h5py.ref_dtype)[:, 0] = [item.ref for item in kept]
+            for item in kept if field == "label" else ():
+                item.attrs["MATLAB_class"] = np.bytes_("char")
+        inner = file.create_group("#refs#/inner")
+        for holder, name, target in ((scope, "outside", scope), (scope, "inside", inner), (inner, "loop", inner)):
+            holder.create_dataset(name, (1, 1), h5py.ref_dtype)[0, 0] = target.ref
+            holder[name].attrs["MATLAB_class"] = np.bytes_("cell")
+
+
+@pytest.mark.parametrize("write", [write_scope, write_scope_73])
+def test_struct_arrays_of_matlab_are_series(tmp_path: Path, write: Callable[[Path], None]) -> None:
+    """A scope of Simulink holds a struct for each signal, whose label is shown."""
+    write(tmp_path / "run.mat")
     entry = {"column": "ScopeData.signals{1}.values", "unit": "A"}
     channels = {"angle": {"column": "ScopeData.signals{0}.values", "unit": "deg"}, "current": entry}
     case = ForeignCase(lambda folder: folder / "run.mat", channels, {"column": "ScopeData.time", "unit": "s"})
     read = import_recording(tmp_path / "run.mat", case.map(tmp_path)).channels
     np.testing.assert_allclose(read["angle"].values, np.deg2rad(angle()), rtol=ROUNDING)
     np.testing.assert_allclose(read["current"].values, fast() ** 2, rtol=ROUNDING)
+    labels = [line.split()[1:] for line in inspect_file(tmp_path / "run.mat").splitlines() if "label" in line]
+    assert [(name, text) for name, _, text in labels] == [
+        ("ScopeData.signals{0}.label", "'position'"),
+        ("ScopeData.signals{1}.label", "'current'"),
+    ]
 
 
 def test_a_map_of_points_makes_static_points(tmp_path: Path) -> None:
