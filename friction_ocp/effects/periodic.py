@@ -67,6 +67,8 @@ FURTHER = 0.1
 """Size of a trial overtone, or of a wave of another period, over the wave's own."""
 SUBHARMONIC = 2.0
 """Period over that of a wave that a further one begins with, where nothing of another period is seen to be missing."""
+ORDERS = (1, 2, 3)
+"""Of a wave and its overtones: where one of these has another phase in each recording, all have."""
 SAME_PERIOD = 0.1
 """Relative difference up to which a period of what is missing is taken for that of the wave, or of an overtone."""
 
@@ -143,19 +145,19 @@ class AbstractWaveEffect(AbstractEffect):
             return None
         period = clues.numbers.get(f"{path}.period", start_of(part.period))
         _, found = self.size_and_waves(drive, place, clues)
-        apart = clues.apart(found)
+        own = [one for one in found if any(abs(order * one.period / period - 1.0) < SAME_PERIOD for order in ORDERS)]
+        apart = next(filter(None, (clues.apart([one]) for one in own)), ())
         plain = not (has_own(part) or part.has_overtones or part.has_other)
-        if plain and apart and abs(found[0].period / period - 1.0) < SAME_PERIOD:
+        if plain and apart:
             part, off, trials = set_apart(part, path, clues, period, apart)
             return Augmentation(self.with_wave(drive, place, part), off, trials)
         off, trials = dict[str, float](), tuple[Trial, ...]()
         if not part.has_overtones:
             part, off, trials = overtones(part, path, clues)
         if not part.has_other:
-            known = [period / order for order in (1, 2, 3)]
-            strange = [one for one in found if all(abs(one.period / other - 1.0) > SAME_PERIOD for other in known)]
-            own = clues.recordings if has_own(part) and self.over_time else ()
-            part, none, further = other_wave(part, path, clues, strange or [Likely(SUBHARMONIC * period)], own)
+            strange = [one for one in found if one not in own] or [Likely(SUBHARMONIC * period)]
+            each = clues.recordings if has_own(part) and self.over_time else ()
+            part, none, further = other_wave(part, path, clues, strange, each)
             off, trials = off | none, trials + further
         return Augmentation(self.with_wave(drive, place, part), off, trials)
 

@@ -13,7 +13,9 @@ from diagnosis_cases import COULOMB, VISCOUS, axis, diagnosed, plain_drive, reco
 from plant import Plant, PlantRipple
 
 from friction_ocp.diagnosis.locate import shape
+from friction_ocp.drive.parts import Cogging, Drive, Motor, Shaft
 from friction_ocp.effects.effect import Clues, Missing, Track
+from friction_ocp.effects.periodic import CoggingEffect
 from friction_ocp.effects.periods import Seen, likeliest
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.estimation.model import prepare
@@ -30,14 +32,21 @@ TEETH, COGS = 6, 0.05
 SAMPLES, INTERVAL = 4000, 1e-3
 
 
-def tracks(phases: tuple[float, ...], sizes: tuple[float, ...] = (0.1, 0.1, 0.1)) -> tuple[Track, ...]:
-    """Return motors to and fro that lack a wave over their angle, of a phase and a size each, beside noise."""
+def tracks(
+    phases: tuple[float, ...], sizes: tuple[float, ...] = (0.1, 0.1, 0.1), beside: tuple[float, float] = (1.0, 0.0)
+) -> tuple[Track, ...]:
+    """Return motors to and fro that lack a wave over their angle, of a phase and a size each, beside noise.
+
+    And one `beside` it: how much finer it is, and how much larger.
+    """
     rng, made = np.random.default_rng(11), list[Track]()
     time, middle = INTERVAL * np.arange(SAMPLES), np.arange(2, SAMPLES, 4)
     for k, phase in enumerate(phases):
         omega = 20.0 * np.sin(2.0 * np.pi * time / (1.0 + 0.1 * k))
         theta = INTERVAL * np.cumsum(omega)
-        torque = sizes[k] * np.cos(TEETH * theta[middle] + phase) + 0.05 * rng.standard_normal(middle.size)
+        turned, (finer, larger) = TEETH * theta[middle] + phase, beside
+        waves = sizes[k] * (np.cos(turned) + larger * np.cos(finer * turned))
+        torque = waves + 0.05 * rng.standard_normal(middle.size)
         missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
         moved = {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}
         made.append(Track(time, *moved, missing, missing, f"run-{k}"))
@@ -61,6 +70,28 @@ def test_waves_of_another_size_in_every_recording_are_none_with_phases_of_their_
     """Something else is missing that looks like them."""
     known = Clues(tracks((0.4, 2.0, 4.0), (0.02, 0.03, 0.3)), {}, {"motor": 1.0})
     assert known.apart(known.waves("motor", "theta")) == ()
+
+
+@pytest.mark.parametrize(
+    ("phases", "beside", "apart"),
+    [
+        ((0.4, 2.0, 4.0), (1.0, 0.0), True),
+        ((0.4, 2.0, 4.0), (2.0, 3.0), True),
+        ((0.4, 2.0, 4.0), (7.3, 3.0), True),
+        ((0.4, 0.4, 0.4), (2.0, 3.0), False),
+    ],
+)
+def test_a_wave_that_was_accepted_is_set_apart_whatever_is_stronger(
+    phases: tuple[float, ...], beside: tuple[float, float], apart: bool
+) -> None:
+    """What is left of it may be less than an overtone of its own, or than a wave of another period."""
+    wave = Cogging(0.2, 0.1, 2.0 * np.pi / TEETH)
+    drive = Drive(shafts=(Shaft("motor", inertia=1e-3),), motors=(Motor("drive", "motor", cogging=wave),))
+    shaped = CoggingEffect().reshaped(drive, "motor", Clues(tracks(phases, beside=beside), {}, {"motor": 1.0}))
+    assert shaped is not None
+    origins = {f"drive.cogging.origin@run-{k}" for k in range(3)}
+    assert (shaped.off.keys() & origins == origins) == apart
+    assert ("drive.cogging.second_cosine" in shaped.off) != apart
 
 
 @pytest.mark.parametrize(("turns", "apart"), [((4.4, 4.4, 4.4), True), ((4.4, 1.5, 1.5), False)])
