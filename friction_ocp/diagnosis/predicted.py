@@ -1,4 +1,4 @@
-"""Additions that short predictions find where simulations have gone astray, and where free runs go on from them."""
+"""Additions that short predictions find where simulations have gone astray, and where these go on from them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from friction_ocp.diagnosis.rival import Rival, is_another
 from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Choice, Round
 from friction_ocp.diagnosis.worth import innovations
+from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.model import with_drive
 from friction_ocp.statistics.execution import Execution
 
@@ -27,16 +28,25 @@ def led_by_predictions(search: Search, run: Execution) -> Search:
     """Look for additions by short predictions where a search lost its way; return the search that found some.
 
     Where simulations have found something and stay far off, what predictions say instead counts if it takes most of
-    what they miss, of lost free runs, or more than what was found, fitted to predictions, takes of it. Free runs that
-    come back to the recordings with these additions show what predictions cannot, and the search goes on with them.
+    what they miss, of lost free runs, or more than what was found, fitted to predictions, takes of it. Simulations that
+    come back to the recordings with these additions show what predictions cannot, which begin with the noise of what
+    they begin at, and the search goes on with them.
     """
     patience = search.patience * max(1.0 - search.allowance.taken, FOR_PREDICTIONS)
     other = Search(open_predicting(search.bench, run), run, search.meant, search.level, search.tell, patience)
     other.go()
     if not other.accepted or (search.accepted and not _tells_otherwise(search, other)):
         return search
-    again = _on_free_runs(search, other, run) if search.bench.base.lost else None
+    again = _carried_back(search, other, run) if search.bench.base.lost or _leads_back(search, other) else None
     return other if again is None else again
+
+
+def _leads_back(search: Search, other: Search) -> bool:
+    """Whether segments that torque noise joins come back to the recordings from where predictions have led."""
+    base, current = search.bench.base, other.bench.current
+    model = with_drive(base.model, current.model.problem.drive)
+    found = polished(model, base.footing, model.space.with_known(current.values), None)
+    return found.holds and not found.astray
 
 
 def _tells_otherwise(search: Search, other: Search) -> bool:
@@ -60,15 +70,21 @@ def _by_predictions(fitted: FittedModel, base: FittedModel) -> FittedModel:
     return min(ends, key=lambda end: end.objective)
 
 
-def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | None:
-    """Go on with free runs from what predictions have found; None where these stay astray."""
-    bench, rounds = search.bench.at(search.bench.base), list[Round]()
+def _carried_back(search: Search, other: Search, run: Execution) -> Search | None:
+    """Go on with simulations from what predictions have found; None where these stay astray.
+
+    A more general shape that does nothing there is left out.
+    """
+    bench, rounds, known = search.bench.at(search.bench.base), list[Round](), set[Key]()
     for item in other.rounds:
         if item.accepted is None or item.accepted.key not in other.accepted:
             continue
-        done = _in_free_runs(bench, item)
+        done = _in_simulations(bench, item)
         if done is None or done.accepted is None:
+            if item.accepted.key in known:
+                continue
             return None
+        known.add(item.accepted.key)
         bench, rounds = bench.at(done.accepted.fitted), [*rounds, done]
     accepted = [item.accepted.key for item in rounds if item.accepted is not None]
     patience = search.patience * max(1.0 - search.allowance.taken - other.allowance.taken, LEAST_SHARE)
@@ -77,13 +93,13 @@ def _on_free_runs(search: Search, other: Search, run: Execution) -> Search | Non
     return again if again.accepted and not again.bench.current.astray else None
 
 
-def _in_free_runs(bench: Bench, item: Round) -> Round | None:
-    """Return a round as free runs see it, from where predictions have left it; None where they come no closer."""
+def _in_simulations(bench: Bench, item: Round) -> Round | None:
+    """Return a round as simulations see it, from where predictions have left it; None where they come no closer."""
     current, rival = bench.current, item.accepted
     assert rival is not None
     model = with_drive(current.model, rival.screened.augmentation.drive)
     start = model.space.with_known({**current.values, **rival.standing.values})
-    fitted = completed(polished(model, current.footing, start, None))
+    fitted = completed(polished(model, current.footing, start, None), thorough=False)
     if not fitted.holds or fitted.cost >= current.cost or is_another(rival.screened, fitted):
         return None
     own = Rival.of(rival.screened, fitted, -Benchmark(current).dearer(fitted))

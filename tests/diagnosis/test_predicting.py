@@ -73,6 +73,11 @@ def test_predictions_tell_what_is_missing(path: Path) -> None:
     assert set(search.accepted) == {("stribeck", "motor")}
     values = search.bench.current.values
     assert values["motor.friction.added.stribeck.torque"] == pytest.approx(RISE["tau_s"] - 0.1, rel=0.2)
+    by_segments = Search(open_bench(problem, HERE), HERE, considered(problem), 0.01, lambda what, share: None)
+    again = predicted._carried_back(by_segments, search, HERE)
+    assert again is not None and again.bench.base.footing.joined and again.accepted[:1] == [("stribeck", "motor")]
+    torque = again.bench.current.values["motor.friction.added.stribeck.torque"]
+    assert torque == pytest.approx(RISE["tau_s"] - 0.1, rel=0.1)
 
 
 def test_they_are_asked_where_a_search_found_nothing_and_its_base_is_astray(path: Path) -> None:
@@ -117,6 +122,20 @@ def test_of_segments_counts_what_predictions_name_if_it_predicts_better(path: Pa
         seat = SimpleNamespace(base=base, current=fits[others])
         other: Any = SimpleNamespace(accepted=[(others, "motor")], bench=seat)
         assert predicted._tells_otherwise(search, other) == counts
+
+
+@pytest.mark.parametrize(("effect", "leads"), [("stribeck", True), ("unbalance", False)])
+def test_segments_go_on_from_predictions_where_they_come_back_to_the_recordings(
+    path: Path, effect: str, leads: bool
+) -> None:
+    """With the effect of the plant; with another one they stay astray."""
+    bench = open_bench(load_problem(path), HERE)
+    base, crew = open_predicting(bench, HERE).base, Crew(bench, HERE, 1, lambda what, share: None)
+    (item,) = crew.screened([(effect, "motor")])
+    model = with_drive(base.model, item.augmentation.drive)
+    named: Any = SimpleNamespace(bench=SimpleNamespace(current=polished(model, base.footing, model.space.guess, None)))
+    search: Any = SimpleNamespace(bench=bench)
+    assert predicted._leads_back(search, named) == leads
 
 
 @pytest.mark.parametrize(("accepted", "astray", "asked"), [(0, True, True), (1, False, False), (1, True, True)])
