@@ -13,6 +13,9 @@ from friction_ocp.simulation.grid import FloatArray
 
 linalg: Any = _linalg
 
+SINGULAR = 1e-12
+"""Eigenvalue over the largest, of a system with ones on its diagonal, below which rounding alone makes it."""
+
 
 @dataclass(frozen=True)
 class Eliminated:
@@ -140,4 +143,24 @@ def halved(diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> Halved
 
 
 def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
+    try:
+        return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return _solve_singular(matrices, right)
+
+
+def _solve_singular(matrices: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve symmetric systems some of which rounding has left singular, in units that make their diagonals one.
+
+    Where a simulation is about to break down derivatives grow beyond all sense, and nothing of smaller ones is left
+    beside them: what cannot be told stays where it is.
+    """
+    size = np.sqrt(np.abs(np.diagonal(matrices, axis1=1, axis2=2)))
+    unit = 1.0 / np.where((size > 0.0) & np.isfinite(size), size, np.inf)
+    with np.errstate(invalid="ignore", over="ignore"):
+        scaled, wanted = (
+            np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+            for values in (unit[:, :, None] * matrices * unit[:, None, :], unit[:, :, None] * right)
+        )
+    inverse = np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)
+    return np.asarray(unit[:, :, None] * (inverse @ wanted), dtype=np.float64)

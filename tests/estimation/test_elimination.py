@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from friction_ocp.estimation.elimination import reduce_system
+from friction_ocp.estimation.elimination import _solve, reduce_system
 from friction_ocp.estimation.program import Blocks, Linearisation
 
 ROUNDING = 1e-7
@@ -73,3 +73,16 @@ def test_reduced_hessian_is_the_schur_complement() -> None:
     system, hessian, _ = random_system(np.random.default_rng(7), [4, 3], 2, 3)
     expected = np.linalg.inv(np.linalg.inv(hessian)[:3, :3])
     np.testing.assert_allclose(reduce_system(system, 0.0).hessian, expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("largest", [2.0**40, np.inf])
+def test_what_rounding_leaves_singular_moves_what_can_be_told(largest: float) -> None:
+    """Derivatives beyond all sense in one segment: its nodes move together or not at all, all others as they do."""
+    sound, right = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([[3.0], [3.0]])
+    absurd = np.array([[largest**2, largest], [largest, 1.0]])
+    solved = _solve(np.stack([sound, np.ones((2, 2)), absurd]), np.stack([right, np.ones((2, 1)), [[largest], [1.0]]]))
+    np.testing.assert_allclose(solved[0], [[1.0], [1.0]], rtol=1e-9)
+    np.testing.assert_allclose(solved[1], [[0.5], [0.5]], rtol=1e-9)
+    assert np.all(np.isfinite(solved[2]))
+    if np.isfinite(largest):
+        np.testing.assert_allclose(absurd @ solved[2], [[largest], [1.0]], rtol=1e-9)
