@@ -89,7 +89,7 @@ def _below(node: Any, name: str, depth: int, seen: set[int]) -> Iterator[_Series
 
 def _referred(node: Any, first: str, last: str, depth: int, seen: set[int]) -> Iterator[_Series]:
     """Yield the elements of a cell, `name{k}`, or of one field of a struct array, `name{k}.field`."""
-    if depth >= MAX_DEPTH or node.size > MAX_ELEMENTS or node.is_virtual or node.external:
+    if depth >= MAX_DEPTH or not _is_short(node):
         return
     for index, reference in enumerate(np.ravel(node[()], order="F")):
         target = node.file[reference] if reference else None
@@ -125,9 +125,14 @@ def _signal(node: Any, name: str, samples: int) -> Signal:
 
 def _text(node: Any) -> str:
     """Return the text of a char array of one line, which is stored as UTF-16."""
-    if node.size > MAX_ELEMENTS or node.dtype != np.uint16 or node.is_virtual or node.external:
+    if node.dtype != np.uint16 or not _is_short(node):
         return ""
     return np.ravel(node[()]).tobytes().decode("utf-16-le", errors="replace")
+
+
+def _is_short(node: Any) -> bool:
+    """Whether a dataset is inside the file, not null, and short enough to be read while the file is listed."""
+    return node.shape is not None and node.size <= MAX_ELEMENTS and not node.is_virtual and not node.external
 
 
 def _values(file: Any, series: _Series, path: Path) -> Values:

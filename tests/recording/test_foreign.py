@@ -481,6 +481,8 @@ def write_scope_73(path: Path) -> None:
         for holder, name, target in ((scope, "outside", scope), (scope, "inside", inner), (inner, "loop", inner)):
             holder.create_dataset(name, (1, 1), h5py.ref_dtype)[0, 0] = target.ref
             holder[name].attrs["MATLAB_class"] = np.bytes_("cell")
+        for name, kind, dtype in (("none", "cell", h5py.ref_dtype), ("empty", "char", np.dtype(np.uint16))):
+            scope.create_dataset(name, data=h5py.Empty(dtype)).attrs["MATLAB_class"] = np.bytes_(kind)
 
 
 @pytest.mark.parametrize("write", [write_scope, write_scope_73])
