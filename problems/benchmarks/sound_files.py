@@ -97,6 +97,10 @@ def _time() -> Any:
     return 0.01 * np.arange(60)
 
 
+def _dates() -> Any:
+    return np.datetime64(1_700_000_000, "s") + (10_000_000 * np.arange(60)).astype("timedelta64[ns]")
+
+
 def _texts(name: str, *contents: str) -> Callable[[Path], list[Path]]:
     def write(folder: Path) -> list[Path]:
         paths = [folder / f"{k}-{name}" for k in range(len(contents))]
@@ -153,6 +157,8 @@ def _matlab73(folder: Path) -> list[Path]:
         file["a_time"], file["log/x"] = _time()[None, :], np.sin(_time())[None, :]
         file["log/name"] = np.frombuffer(b"rig", dtype=np.uint8).astype(np.uint16)[:, None]
         file["log/name"].attrs["MATLAB_class"] = np.bytes_("char")
+        parts = [file.create_dataset(f"#refs#/{name}", data=_time()[None, :]) for name in "ab"]
+        file.create_dataset("log/parts/values", (2, 1), h5py.ref_dtype)[:, 0] = [part.ref for part in parts]
     return [folder / "seven.mat"]
 
 
@@ -160,9 +166,8 @@ def _parquet(folder: Path) -> list[Path]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    dates = (1_700_000_000_000_000_000 + np.arange(60) * 10_000_000).astype("datetime64[ns]")
     fields = [("t", pa.float64()), ("x", pa.float32()), ("date", pa.timestamp("ns")), ("s", pa.string())]
-    columns = [pa.array(_time()), pa.array(np.sin(_time()), pa.float32()), pa.array(dates), pa.array(["a"] * 60)]
+    columns = [pa.array(_time()), pa.array(np.sin(_time()), pa.float32()), pa.array(_dates()), pa.array(["a"] * 60)]
     table = pa.table(columns, schema=pa.schema([pa.field(*item, metadata={"unit": "s"}) for item in fields]))
     paths = [folder / "plain.parquet", folder / "packed.parquet"]
     pq.write_table(table, paths[0], compression="none", use_dictionary=False)
@@ -219,12 +224,15 @@ def _numpy(folder: Path) -> list[Path]:
     log["t"] = _time()
     with (folder / "array.npz").open("wb") as file:
         np.save(file, log)
-    return [folder / "plain.npz", folder / "packed.npz", folder / "array.npz"]
+    np.savez(folder / "dated.npz", t=_dates(), x=np.sin(_time()))
+    return [folder / "plain.npz", folder / "packed.npz", folder / "array.npz", folder / "dated.npz"]
 
 
 _JSON = json.dumps({"t": _time().tolist(), "x [deg]": np.sin(_time()).tolist(), "mass": 0.5, "curve": {"1": 2, "3": 4}})
 _RECORDS = json.dumps([{"t": float(t), "x": float(np.sin(t)), "arm": {"y": [1, None]}} for t in _time()])
 _CSV = "".join(f"{t:.2f},{np.sin(t):.6f},{k % 7}\n" for k, t in enumerate(_time()))
+_DATED = "date;x\n" + "".join(f"30.11.2026 23:59:{59.0 + t:06.3f};{np.sin(t):.6f}\n" for t in _time())
+_DATED_RECORDS = json.dumps([{"t": f"{date}Z", "x": 1.0} for date in _dates()])
 _GERMAN = "# Bench\nt [s];x [deg];n\n" + _CSV.replace(",", ";").replace(".", ",")
 
 WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
@@ -232,7 +240,7 @@ WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
     "map": _texts("map.yaml", MAP),
     "recording": lambda folder: [_recording(folder / "run.h5")],
     "static": _static,
-    "csv": _texts("log.csv", "t,x [deg],n\n" + _CSV, _CSV, _GERMAN),
+    "csv": _texts("log.csv", "t,x [deg],n\n" + _CSV, _CSV, _GERMAN, _DATED),
     "hdf5": _hdf5,
     "matlab5": _matlab5,
     "matlab73": _matlab73,
@@ -242,6 +250,6 @@ WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
     "tdms": _tdms,
     "mcap": _rosbag("MCAP", ".mcap"),
     "rosbag": _rosbag("SQLITE3", ".db3"),
-    "json": _texts("log.json", _JSON, _RECORDS),
+    "json": _texts("log.json", _JSON, _RECORDS, _DATED_RECORDS),
     "numpy": _numpy,
 }
