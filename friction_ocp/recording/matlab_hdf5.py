@@ -91,7 +91,8 @@ def _referred(node: Any, first: str, last: str, depth: int, seen: set[int]) -> I
     """Yield the elements of a cell, `name{k}`, or of one field of a struct array, `name{k}.field`."""
     if depth >= MAX_DEPTH or not _is_short(node):
         return
-    for index, reference in enumerate(np.ravel(node[()], order="F")):
+    references: Any = np.ravel(node[()], order="F")
+    for index, reference in enumerate(references):
         target = node.file[reference] if reference else None
         if target is None or not (target.name or "").startswith(REFERRED):
             continue
