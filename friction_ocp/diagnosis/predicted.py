@@ -75,18 +75,16 @@ def _carried_back(search: Search, other: Search, run: Execution) -> Search | Non
 
     A more general shape that does nothing there is left out.
     """
-    bench, rounds, known = search.bench.at(search.bench.base), list[Round](), set[Key]()
+    bench, rounds, accepted = search.bench.at(search.bench.base), list[Round](), list[Key]()
     for item in other.rounds:
         if item.accepted is None or item.accepted.key not in other.accepted:
             continue
         done = _in_simulations(bench, item)
         if done is None or done.accepted is None:
-            if item.accepted.key in known:
+            if item.accepted.key in accepted:
                 continue
             return None
-        known.add(item.accepted.key)
-        bench, rounds = bench.at(done.accepted.fitted), [*rounds, done]
-    accepted = [item.accepted.key for item in rounds if item.accepted is not None]
+        bench, rounds, accepted = bench.at(done.accepted.fitted), [*rounds, done], [*accepted, done.accepted.key]
     patience = search.patience * max(1.0 - search.allowance.taken - other.allowance.taken, LEAST_SHARE)
     again = Search(bench, run, search.meant, search.level, search.tell, patience, rounds=rounds, accepted=accepted)
     again.go()

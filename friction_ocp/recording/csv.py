@@ -41,7 +41,7 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
         Signal(name, rows, "s" if column in layout.stamped else header_unit(name) or unit)
         for column, (name, unit) in enumerate(headed)
     ]
-    origin = instant(layout.origin) if layout.origin else ""
+    origin = instant(layout.origin)
     if import_map is not None:
         read = partial(_read_columns, path, layout, import_map.decimal)
         yield ForeignFile(tuple(signals), read, no_clock, summary, origin)
@@ -49,8 +49,8 @@ def open_csv(path: Path, import_map: ImportMap | None = None) -> Generator[Forei
     check_sizes(path, signals)
     odd = _OddRows(len(layout.names))
     values, hint = _whatever_is_a_number(path, layout, odd)
-    for column, dated in layout.stamped.items():
-        values[column] = values[column] if dated else past_midnight(values[column])
+    for column in layout.times_of_day:
+        values[column] = past_midnight(values[column])
     known = [
         replace(signal, samples=len(column), numeric=bool(np.any(np.isfinite(column))))
         for signal, column in zip(signals, values, strict=True)
@@ -193,6 +193,5 @@ def _read_columns(path: Path, layout: Layout, decimal: str | None, indices: Sequ
     findings = [Finding(str(path), what, remedy="complete or remove the line") for what in odd.told] + findings
     if findings:
         raise FrictionOcpError(findings[:_TOLD])
-    times_of_day = {index for index, dated in layout.stamped.items() if not dated}
     whole = {index: joined(found) for index, found in pieces.items()}
-    return {index: past_midnight(found) if index in times_of_day else found for index, found in whole.items()}
+    return whole | {index: past_midnight(whole[index]) for index in layout.times_of_day if index in whole}

@@ -37,6 +37,11 @@ class Layout:
     origin: int
     """The earliest of their first instants, ns since 1970; 0 where there are no dates."""
 
+    @property
+    def times_of_day(self) -> list[int]:
+        """Columns of times of day, which begin again at midnight."""
+        return [column for column, dated in self.stamped.items() if not dated]
+
 
 def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
     """Find delimiter, header and first row of numbers; raises FrictionOcpError where there are none."""

@@ -165,5 +165,5 @@ def seconds_since(nanoseconds: Values, origin: int) -> FloatArray:
 
 
 def instant(nanoseconds: int) -> str:
-    """Return a count of ns since 1970 as a date, UTC."""
-    return f"{np.datetime64(nanoseconds, 'ns')}Z"
+    """Return a count of ns since 1970 as a date, UTC; "" for 0, which stands for a file without dates."""
+    return f"{np.datetime64(nanoseconds, 'ns')}Z" if nanoseconds else ""

@@ -14,8 +14,7 @@ def in_memory(columns: Mapping[str, Values], summary: str) -> ForeignFile:
     found, dates, origin = as_seconds(columns)
     names = tuple(found)
     signals = tuple(_signal(name, values, name in dates) for name, values in found.items())
-    since = instant(origin) if origin else ""
-    return ForeignFile(signals, lambda wanted: {k: found[names[k]] for k in wanted}, no_clock, summary, since)
+    return ForeignFile(signals, lambda wanted: {k: found[names[k]] for k in wanted}, no_clock, summary, instant(origin))
 
 
 def _signal(name: str, values: Values, is_date: bool) -> Signal:

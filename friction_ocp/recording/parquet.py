@@ -33,7 +33,7 @@ def open_parquet(path: Path, import_map: ImportMap | None = None) -> Generator[F
                 return {k: reader.column(fields[k], origin) for k in wanted}
 
         summary = f"{file.metadata.num_rows} rows"
-        yield ForeignFile(signals, read, no_clock, summary, instant(origin) if origin else "")
+        yield ForeignFile(signals, read, no_clock, summary, instant(origin))
 
 
 class _Reader:

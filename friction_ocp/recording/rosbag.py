@@ -89,7 +89,7 @@ def open_rosbag(path: Path, import_map: ImportMap | None = None) -> Generator[Fo
     def clock(name: str) -> FloatArray:
         return seconds_since(topics[name].times, origin)
 
-    yield ForeignFile(tuple(signals), read, clock, _summary(topics), instant(origin) if origin else "")
+    yield ForeignFile(tuple(signals), read, clock, _summary(topics), instant(origin))
 
 
 def _summary(topics: Mapping[str, _Topic]) -> str:

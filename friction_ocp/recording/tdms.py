@@ -43,7 +43,7 @@ def open_tdms(path: Path, import_map: ImportMap | None = None) -> Generator[Fore
             return shift + first + step * np.arange(len(channels[k]), dtype=np.float64)
 
         signals = tuple(_signal(channel, clocks.get(k, "")) for k, channel in enumerate(channels))
-        yield ForeignFile(signals, read, clock, "TDMS", instant(origin) if origin else "")
+        yield ForeignFile(signals, read, clock, "TDMS", instant(origin))
 
 
 def _signal(channel: Any, clock: str) -> Signal:
