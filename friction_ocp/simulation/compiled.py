@@ -13,7 +13,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache, lru_cache
 from importlib.resources import files
 from itertools import pairwise
@@ -67,13 +67,38 @@ class CompiledKernel(AbstractKernel):
             cuts = shares(steps, self._lanes, count)
             works = [(rows[begin:stop], columns) for begin, stop in pairwise(cuts) if stop > begin]
             if len(works) > 1:
-                list(_pool(threads).map(self._simulate, works))
+                self._simulate_all(works, threads)
             else:
                 self._simulate(works[0])
+
+    def _simulate_all(self, works: Sequence[tuple[Addresses, int]], threads: int) -> None:
+        pool = _pool(threads)
+        running = [pool.submit(self._simulate, work) for work in works]
+        _await(running)
+        for item in running:
+            item.result()
 
     def _simulate(self, work: tuple[Addresses, int]) -> None:
         rows, columns = work
         self._sweep(ctypes.c_long(len(rows)), ctypes.c_void_p(rows.ctypes.data), ctypes.c_int(columns))
+
+
+def _await(running: Sequence[Future[None]]) -> None:
+    """Wait for threads; an interrupt is raised when none of them writes any longer to memory that is given back then.
+
+    However often that is asked for: it takes a sweep at most.
+    """
+    interrupt: KeyboardInterrupt | None = None
+    while True:
+        try:
+            wait(running)
+            break
+        except KeyboardInterrupt as error:
+            interrupt = error
+            for item in running:
+                item.cancel()
+    if interrupt is not None:
+        raise interrupt
 
 
 @cache

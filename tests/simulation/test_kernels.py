@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
+from threading import current_thread, main_thread
+from time import sleep
 
 import numpy as np
 import pytest
@@ -72,6 +76,31 @@ def test_threads_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     for one, three in zip(*results, strict=True):
         for name in ("y", "end", "dy", "dend", "states"):
             assert np.array_equal(getattr(one, name), getattr(three, name))
+
+
+@needs_compiler
+def test_interrupted_threads_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupts, one or more, come out when no thread is left that writes to memory that is given back then."""
+    case = Case(DRIVES["two masses"]())
+    kernel = Sweep(case.model, case.active).kernel
+    requests = [case.request(np.random.default_rng(seed)) for seed in range(2)]
+    fine = [replace(item, grid=replace(item.grid, substeps=item.grid.substeps * 40)) for item in requests]
+    sizes = len(case.model.state_names), len(case.model.output_names), len(case.active)
+    begun, ended = list[object](), list[object]()
+
+    def slow(self: CompiledKernel, work: object) -> None:
+        if current_thread() is main_thread():
+            return  # what it simulates ends before it is interrupted
+        begun.append(work)
+        sleep(0.1)  # until all threads run
+        os.kill(os.getpid(), signal.SIGINT)
+        sleep(0.1)
+        ended.append(work)
+
+    monkeypatch.setattr(CompiledKernel, "_simulate", slow)
+    with pytest.raises(KeyboardInterrupt):
+        kernel.run([Piece(item, empty_result(item, *sizes)) for item in fine], threads=2)
+    assert len(begun) == len(ended) == 2
 
 
 @needs_compiler
