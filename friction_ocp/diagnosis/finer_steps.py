@@ -11,18 +11,21 @@ from friction_ocp.estimation.refinement import stepped_finely
 
 SEARCHING = 1.0
 """How far, in standard errors, half the step may move a parameter while models compete: no verdict hangs on that."""
+OF_MISSING = 0.001
+"""Share of what a model lacks that such a move may be worth in any case: a hundredth of what an addition must explain
+of it."""
 
 
 def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
     """Fit again on shorter integrator steps where the error of those that a fit was made with shows or moves it.
 
-    It moves it where half the step shifts a parameter by more than `shift` standard errors: the first step follows from
-    the guesses, and a spring may be far harder. Not where a model is astray, or compared by short predictions because
-    others of it were: there no step says more.
+    It moves it where half the step shifts a parameter by more than `shift` standard errors, and by more than OF_MISSING
+    allows: the first step follows from the guesses, and a spring may be far harder. Not where a model is astray, or
+    compared by short predictions because others of it were: there no step says more.
     """
     if fitted.astray or fitted.footing.predicted or not fitted.holds:
         return fitted
-    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift)
+    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift, OF_MISSING)
     return on_steps_of(model, fitted)
 
 

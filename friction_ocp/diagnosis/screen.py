@@ -13,6 +13,7 @@ from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import AbstractEffect, Augmentation, Clues, Key, Trial
+from friction_ocp.effects.registry import effects
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.parameters import Free
 from friction_ocp.simulation.grid import FloatArray
@@ -68,6 +69,11 @@ class Screened:
         """Whether this has all added parameters of another candidate, and more."""
         own, others = set(self.augmentation.off), set(other.augmentation.off)
         return bool(others) and others < own
+
+    def includes(self, other: Screened) -> bool:
+        """Whether another candidate is this one without some of its parameters, or with those that nature has."""
+        named = self.component == other.component and other.effect in effects()[self.effect].includes
+        return named or self.holds(other)
 
 
 def screen(base: FittedModel, effect: AbstractEffect, place: str, clues: Clues) -> Screened | None:

@@ -98,8 +98,8 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
     two differ by less than chance makes of them, neither takes all. Source: Yao et al. 2018, pseudo-BMA+. Every further
     parameter costs what Schwarz 1978 asks for and what was held out did not charge (`price`), a period more as it is
     told more exactly, and its distance from stated values what their priors say; rivals that leave the same residuals
-    share what they have. Of an effect and one that has all of it and more, the plain one comes first as long as it is
-    not excluded, or where what the other has more came out as nothing.
+    share what they have. Of an effect and one that has all of it and more, or is one with other numbers, the plain
+    one comes first as long as it is not excluded, or where what the other has more came out as nothing.
     """
     if not rivals:
         return NOTHING
@@ -122,7 +122,7 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
         aliases=tuple(aliases),
         same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
     )
-    others = [rival for rival in ordered[1:] if ordered[0].screened.holds(rival.screened)]
+    others = [rival for rival in ordered[1:] if ordered[0].screened.includes(rival.screened)]
     special = next((rival for rival in others if rival in aliases or _adds_nothing(ordered[0], rival)), None)
     return found if special is None else with_first(found, special)
 

@@ -250,6 +250,8 @@ class AbstractEffect(ABC):
     """What it means, for the reader."""
     resembles: ClassVar[tuple[str, ...]] = ()
     """Effects of which one may look like this one, and of which the prediction for a large one says little."""
+    includes: ClassVar[tuple[str, ...]] = ()
+    """Effects that are this one with some of its numbers as nature has them, such as a period of one turn."""
 
     @abstractmethod
     def places(self, drive: Drive) -> Iterable[str]:

@@ -213,6 +213,7 @@ class CoggingEffect(AbstractMotorWaveEffect):
 
     name: ClassVar[str] = "cogging"
     sentence: ClassVar[str] = "a torque periodic in the motor angle, with or without current"
+    includes: ClassVar[tuple[str, ...]] = ("unbalance",)
     kind: ClassVar[type[Wave]] = Cogging
 
     def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:

@@ -123,3 +123,15 @@ def test_a_special_case_comes_before_what_contains_it() -> None:
     assert found.aliases == (zero, disc) and found.rivals[0] is zero
     assert found.probabilities[0] > found.probabilities[1] > 0.0
     assert chosen(replace(disc, gains=disc.gains + 1.0), zero).aliases[0].key == disc.key
+
+
+def test_a_wave_that_may_have_any_period_comes_after_an_unbalance() -> None:
+    """As long as one turn is not excluded; it is still named beside that, since a magnet may have the same period."""
+    pull = rival("unbalance", "motor", {"motor.gravity.torque": 0.0}, gain=5.0)
+    wave = rival("cogging", "motor", {"motor.cogging.cosine": 0.0}, gain=3.0)
+    found = replace(wave.standing, values={"motor.cogging.cosine": 0.1})
+    wave = replace(wave, gains=pull.gains + 0.03, standing=found)
+    assert [item.key[0] for item in chosen(wave, pull).named] == ["unbalance", "cogging"]
+    assert [item.key[0] for item in chosen(replace(wave, gains=wave.gains + 1.0), pull).named] == ["cogging"]
+    elsewhere = rival("unbalance", "load", {"load.gravity.torque": 0.0}, gain=5.0)
+    assert chosen(wave, elsewhere).rivals[0].key == wave.key
