@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.kinks import around_kinks
 from friction_ocp.diagnosis.own_noise import gap_prices, with_own_noise
+from friction_ocp.estimation.around_kinks import around_kinks
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
 from friction_ocp.estimation.node_ends import STEPS_OF_NODES, UNIMPORTANT
 from friction_ocp.estimation.nodes import solve_nodes
-from friction_ocp.estimation.own_numbers import fitted_again
 from friction_ocp.estimation.program import Point, Program, Tether
 from friction_ocp.estimation.quadratic import bounded_step
 from friction_ocp.simulation.grid import BoolArray, FloatArray
@@ -99,10 +98,22 @@ def _step_without(fitted: FittedModel, left: BoolArray, kept: FloatArray) -> tup
 
 def fitted_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:
     """Return the parameters fitted to all recordings but some; what each of these has for itself, to that alone."""
-    items = fitted.linear.program.experiments
+    items, theta = fitted.linear.program.experiments, _shared_without(fitted, group)
     there = {item.name for k, item in enumerate(items) if k not in group}
-    gone = [items[k] for k in group if items[k].name not in there]
-    return fitted_again(fitted.model, gone, _shared_without(fitted, group))
+    for name in dict.fromkeys(items[k].name for k in group):
+        own = np.array([path.partition("@")[2] == name for path in fitted.model.space.names], dtype=bool)
+        if name not in there and np.any(own):
+            theta = _own_of(fitted, [k for k in group if items[k].name == name], theta, own)
+    return theta
+
+
+def _own_of(fitted: FittedModel, group: Sequence[int], theta: FloatArray, own: BoolArray) -> FloatArray:
+    """Return parameters with those that one recording has for itself fitted to it, from where it had them."""
+    space, change = fitted.model.space, np.where(own, 0.0, theta - fitted.theta)
+    pinned = replace(space, lower=np.where(own, space.lower, theta), upper=np.where(own, space.upper, theta))
+    nodes = tuple(item.nodes + item.moved_by(change) for item in (fitted.linear.recordings[k] for k in group))
+    alone = replace(_some(fitted.linear.program, group), space=pinned)
+    return solve_gauss_newton(alone, Point(theta, nodes), FOLD).point.theta
 
 
 def _shared_without(fitted: FittedModel, group: Sequence[int]) -> FloatArray:

@@ -6,17 +6,11 @@ from dataclasses import replace
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.linear import linear_program
-from friction_ocp.diagnosis.polishing import COARSE
-from friction_ocp.estimation.gauss_newton import Solution, Tolerances, solve_gauss_newton
-from friction_ocp.estimation.model import Model
+from friction_ocp.estimation.around_kinks import around_kinks
 from friction_ocp.estimation.node_ends import WARM
-from friction_ocp.estimation.program import Point, Program
+from friction_ocp.estimation.program import Point
 from friction_ocp.estimation.rough_bowl import stepped_out, unstuck
 from friction_ocp.execution.effort import piece
-
-DETOURS = (0.02, 0.004, 0.0008, 0.00016)
-"""Smoothing of the sign over the typical speed on the way around kinks, and back step by step: in one step, nodes that
-wide smoothing has moved are caught at kinks that are not theirs."""
 
 
 def freed(fitted: FittedModel) -> FittedModel:
@@ -48,11 +42,3 @@ def _moved(fitted: FittedModel, point: Point) -> FittedModel:
 def loosened(fitted: FittedModel) -> FittedModel:
     """Go on from fresh nodes, or from those that friction with a hardly smoothed sign leads to, if that leads on."""
     return _moved(fitted, unstuck(fitted.model, fitted.linear.program, fitted.linear.point))
-
-
-def around_kinks(model: Model, program: Program, point: Point, limits: Tolerances) -> Solution:
-    """Solve again from where friction with a smoothed sign leads to, less and less of it."""
-    for width in DETOURS:
-        rounded = replace(program, width=width * model.speed_scale)
-        point = solve_gauss_newton(rounded, point, COARSE).point
-    return solve_gauss_newton(program, point, limits)

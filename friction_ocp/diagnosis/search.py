@@ -125,6 +125,7 @@ class Search:
                 if not self._left_out.fall_short(self.bench, self.level):
                     break
             if self.allowance.exhausted():
+                self._give_shapes()
                 break
 
     def _seems_missing(self, first: Round) -> bool:
@@ -307,6 +308,15 @@ class Search:
         What a shape leaves is too little to tell as power, and yet enough to tell rivals apart that are the same; and
         what an earlier addition explained may have been no more than that shape.
         """
+        self._give_shapes()
+        if len(set(self.accepted)) > 1:
+            self.tell("weighing rivals of earlier additions again", 0.0)
+            self._exchange()
+        elif self.accepted:
+            self._weigh_shapes()
+
+    def _give_shapes(self) -> None:
+        """Give additions the more general shapes that the recordings ask for, however much a search has taken."""
         for _ in set(self.accepted):
             done = self._round(self.bench, self.accepted, NONE)
             if done.accepted is None:
@@ -317,11 +327,6 @@ class Search:
                 self.bench, self.rounds, self.accepted, self.level, self.rng, self.run
             )
             self.bench = self.bench.at(current)
-        if len(set(self.accepted)) > 1:
-            self.tell("weighing rivals of earlier additions again", 0.0)
-            self._exchange()
-        elif self.accepted:
-            self._weigh_shapes()
 
     def _weigh_shapes(self) -> None:
         """Weigh the only addition against others, each in the shape that the recordings give it."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from friction_ocp.drive.parts import Drive
 from friction_ocp.drive.values import bind_drive, drive_leaves
+from friction_ocp.estimation.around_kinks import around_kinks, smoothed
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.gauss_newton import Tolerances, solve_gauss_newton
@@ -28,6 +29,8 @@ from friction_ocp.simulation.losses import Squares
 ENOUGH = Tolerances(max_iterations=30)
 MOST_STARTS = 3
 """From which they are fitted."""
+MOST_SMOOTH = 2
+"""From which they are fitted by way of a smoothed sign."""
 MOST_PASSES = 4
 """Of all starts on the nodes of the nearest."""
 ORIGIN, PERIOD = "origin", "period"
@@ -54,20 +57,6 @@ def own_numbers(
     asked = [item for item in experiments if item.name in uses]
     found = {item.name: _fitted(model, shared, uses[item.name], item, known) for item in asked}
     return {name: numbers for name, numbers in found.items() if numbers}
-
-
-def fitted_again(model: Model, experiments: Sequence[Experiment], theta: FloatArray) -> FloatArray:
-    """Return parameters with those that fitted recordings have for themselves as if these had taken no part."""
-    uses, found = {use.name: use for use in model.problem.train}, dict[str, float]()
-    for item in experiments:
-        own = {name for name in model.space.names if name.partition("@")[2] == item.name}
-        if own:
-            known = {
-                name: float(value) for name, value in zip(model.space.names, theta, strict=True) if name not in own
-            }
-            numbers = _fitted(model, _bound(model, known), uses[item.name], item, known)
-            found |= {f"{path}@{item.name}": value for path, value in numbers.items()}
-    return np.array([found.get(name, value) for name, value in zip(model.space.names, theta, strict=True)])
 
 
 def _bound(model: Model, known: Mapping[str, float]) -> Drive:
@@ -110,7 +99,9 @@ def _fitted(
     begins = [space.clip(begin) for start in others for begin in _at_other_crests(start, paths, numbers)]
     starts = [solve_nodes(program, suggested_point(program, begin)) for begin in _different(begins)]
     nearest = _on_the_best_nodes(program, starts)[:MOST_STARTS]
-    best = min((solve_gauss_newton(program, start, ENOUGH) for start in nearest), key=lambda end: end.objective)
+    ends = [solve_gauss_newton(program, start, ENOUGH) for start in nearest]
+    ends += [around_kinks(seen, program, start, ENOUGH) for start in _smoothly(seen, program, starts)[:MOST_SMOOTH]]
+    best = min(ends, key=lambda end: end.objective)
     return dict(zip(paths, map(float, best.point.theta), strict=True))
 
 
@@ -130,6 +121,16 @@ def _on_the_best_nodes(program: Program, starts: Sequence[Point]) -> list[Point]
         if before - min(map(cost, found)) < UNIMPORTANT:
             break
     return [item for _, item in sorted(found, key=cost)]
+
+
+def _smoothly(model: Model, program: Program, starts: Sequence[Point]) -> list[Point]:
+    """Return starts with the nodes that friction with a smoothed sign has there, the nearest first.
+
+    It tells them apart where exact friction leaves nodes at ends of their own.
+    """
+    rounded = smoothed(model, program)
+    found = [solve_nodes(rounded, suggested_point(rounded, start.theta)) for start in starts]
+    return sorted(found, key=rounded.objective)
 
 
 def _at_other_crests(start: FloatArray, paths: Sequence[str], numbers: Mapping[str, Any]) -> Iterator[FloatArray]:

@@ -12,6 +12,9 @@ import yaml
 from diagnosis_cases import COULOMB, VISCOUS, axis, diagnosed, plain_drive, record, write_case
 from plant import Plant, PlantRipple
 
+from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.held_out import fitted_without
+from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.locate import shape
 from friction_ocp.drive.parts import Cogging, Drive, Motor, Shaft
 from friction_ocp.effects.effect import Clues, Missing, Track
@@ -19,7 +22,8 @@ from friction_ocp.effects.periodic import CoggingEffect
 from friction_ocp.effects.periods import Seen, likeliest
 from friction_ocp.estimation.estimate import identify, simulate
 from friction_ocp.estimation.model import prepare
-from friction_ocp.estimation.own_numbers import _at_other_crests, fitted_again
+from friction_ocp.estimation.own_numbers import _at_other_crests, own_numbers
+from friction_ocp.estimation.program import Point
 from friction_ocp.parameters import Free
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.hdf5 import write_recording
@@ -186,9 +190,9 @@ def test_a_wave_that_begins_far_away_in_a_recording_is_found_there(share: float,
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
     model = prepare(load_problem(path))
     second = [item for item in model.train if item.name == "b"]
-    again = dict(zip(model.space.names, fitted_again(model, second, model.space.guess), strict=True))
-    assert again["motor.disturbance.origin@b"] % PERIOD == pytest.approx(share * PERIOD, abs=0.02 * PERIOD)
-    assert again["motor.disturbance.origin@a"] == 0.0
+    ((path, origin),) = own_numbers(model, second, model.space.guess, fitted=False)["b"].items()
+    assert path == "motor.disturbance.origin"
+    assert origin % PERIOD == pytest.approx(share * PERIOD, abs=0.02 * PERIOD)
 
 
 def test_every_wave_is_tried_at_other_places_of_its_period() -> None:
@@ -233,9 +237,8 @@ def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path)
         assert values[f"{name}@{recording}"] == pytest.approx(torque, abs=2e-3)
     model = prepare(problem)
     far = model.space.with_known({**found.values, f"{name}@a": 0.9 * COULOMB})
-    again = dict(zip(model.space.names, fitted_again(model, model.train[:1], far), strict=True))
-    assert again[f"{name}@a"] == pytest.approx(torques[0], abs=2e-3)
-    assert again == {**found.values, f"{name}@a": again[f"{name}@a"]}
+    again = own_numbers(model, model.train[:1], far, fitted=False)
+    assert again == {"a": {name: pytest.approx(torques[0], abs=2e-3)}}
     train, validation = (
         one["position"][0].noise_ratio for one in (found.simulation.train_errors, found.simulation.validation_errors)
     )
@@ -245,3 +248,25 @@ def test_what_differs_by_recording_is_fitted_to_what_is_held_out(tmp_path: Path)
     assert written_down["validation"][0]["set"] == {name: pytest.approx(held.own[name])}
     result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert result["fit"]["own_values"] == {"c": {name: pytest.approx(held.own[name])}}
+
+
+def test_what_a_recording_has_for_itself_is_fitted_to_it_where_it_is_left_out(tmp_path: Path) -> None:
+    """From where it was with all of them: short segments of it alone need not lead there."""
+    phases = {"a": 0.3, "b": 2.1, "c": 4.0}
+    path = written(tmp_path, tuple(map(pushed, phases.values())), ())
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    document["drive"] = plain_drive(VISCOUS)
+    origin = {"guess": 0.0, "scope": "recording"}
+    document["drive"]["shafts"][0]["disturbance"] = {"cosine": SIZE, "sine": 0.0, "period": PERIOD, "origin": origin}
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    fitted = fit_base(prepare(load_problem(path)))
+    (own,) = (k for k, name in enumerate(fitted.model.space.names) if name.endswith("@a"))
+    others = [k for k, name in enumerate(fitted.model.space.names) if "@" not in name]
+    far = fitted.theta.copy()
+    far[own] += 0.1 * PERIOD
+    moved = replace(fitted, linear=linear_program(fitted.linear.program, Point(far, fitted.linear.point.nodes)))
+    for known in (fitted, moved):
+        found = fitted_without(known, [0])
+        turns = found[own] / PERIOD - phases["a"] / (2.0 * np.pi)
+        assert turns == pytest.approx(round(turns), abs=0.01)
+        assert found[others] == pytest.approx(fitted.theta[others], rel=0.05)
