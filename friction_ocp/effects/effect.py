@@ -133,6 +133,18 @@ class Clues:
             self._known_waves[asked] = self._looked_for(*asked)
         return self._known_waves[asked]
 
+    def waves_in_time(self, shaft: str) -> list[Likely]:
+        """Return the likeliest waves over time at a shaft, and the likeliest one at each other shaft beside them.
+
+        What comes from outside has its period wherever it acts, and shows it best at the shaft whose torque is known
+        best: one that takes a larger share there than any does here comes first.
+        """
+        own = self.waves(shaft, "time")
+        elsewhere = [self.waves(name, "time")[0] for name in self.tracks[0].finely.torque if name != shaft]
+        more = sorted((one for one in elsewhere if one.share > 0.0), key=lambda one: -one.share)
+        first = [one for one in more if one.share > own[0].share]
+        return [*first, *own, *(one for one in more if one not in first)]
+
     def _looked_for(self, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> list[Likely]:
         whole = [track.theta[shaft] if over == "theta" else track.time for track in self.tracks]
         travel = max(float(np.ptp(one)) for one in whole)

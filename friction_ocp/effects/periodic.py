@@ -249,7 +249,7 @@ class PeriodicDisturbanceEffect(AbstractWaveEffect):
         return change_shaft(drive, place, disturbance=part)
 
     def size_and_waves(self, drive: Drive, place: str, clues: Clues) -> tuple[float, list[Likely]]:
-        return SHARE * clues.typical_torque[place], clues.waves(place, "time")
+        return SHARE * clues.typical_torque[place], clues.waves_in_time(place)
 
 
 LARGEST = 0.5

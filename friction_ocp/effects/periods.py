@@ -55,6 +55,8 @@ class Likely:
     switched on, and what comes from outside does not wait for a recording to begin."""
     crests: Mapping[str, float] = field(default_factory=dict[str, float])
     """By recording: the place amid it at which the wave is highest with a phase of its own, rad or s."""
+    share: float = 0.0
+    """Of the squares of what is missing, beyond parameters, that it takes; 0 where nothing is."""
 
     def beginning(self, recording: str) -> float:
         """Return where periods begin along a recording: at a crest where phases differ."""
@@ -84,8 +86,8 @@ def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
     step, each = 0.5 / max(travel, 1e-300), _by_recording(seen)
     sharp = [_sharpened(each, float(frequencies[k]), step) for k in peaks(power, beyond)]
     return [
-        Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each})
-        for frequency, apart in dict.fromkeys(sharp)
+        Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each}, share)
+        for frequency, apart, share in dict.fromkeys(sharp)
     ]
 
 
@@ -110,20 +112,20 @@ def _parts(one: Seen, most: float) -> Iterator[Seen]:
         yield from _parts(half, most)
 
 
-def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[float, bool]:
-    """Return the strongest frequency within a step of one, and whether it is so with a phase for each recording.
+def _sharpened(each: Sequence[Seen], frequency: float, step: float) -> tuple[float, bool, float]:
+    """Return the strongest frequency within a step of one, whether it is so with a phase for each recording, its share.
 
     `each` are whole recordings.
     """
     alike, shared = _strongest([_joined(each)], frequency, step)
+    whole = max(sum(float(np.sum(one.beyond**2)) for one in each), 1e-300)
     if len(each) == 1:
-        return alike, False
+        return alike, False, shared / whole
     differing, own = _strongest(each, frequency, step)
     more = 2 * (len(each) - 1)
     left = sum(one.place.size for one in each) - more - 3
-    whole = sum(float(np.sum(one.beyond**2)) for one in each)
     apart = are_apart(shared, own, whole, more, left) and _of_one_size(each, differing)
-    return (differing, True) if apart else (alike, False)
+    return (differing, True, own / whole) if apart else (alike, False, shared / whole)
 
 
 def are_apart(shared: float, own: float, whole: float, more: int, left: int) -> bool:

@@ -98,6 +98,24 @@ def test_a_wave_that_was_accepted_is_set_apart_whatever_is_stronger(
     assert ("drive.cogging.second_cosine" in shaped.off) != apart
 
 
+def test_what_comes_from_outside_is_looked_for_where_it_shows_best() -> None:
+    """Its period is the same at every shaft, and the torque of one may be known badly."""
+    rng, time, middle = np.random.default_rng(4), INTERVAL * np.arange(SAMPLES), np.arange(2, SAMPLES, 4)
+    omega = 20.0 * np.sin(2.0 * np.pi * time)
+    pushes = SIZE * np.cos(2.0 * np.pi * time[middle] / PERIOD)
+    torque = {
+        name: pushes + noise * rng.standard_normal(middle.size) for name, noise in (("motor", 0.1), ("load", 4.0))
+    }
+    both = dict.fromkeys(torque, omega)
+    missing = Missing(middle, torque, {}, {name: item[middle] for name, item in both.items()})
+    clues = Clues((Track(time, {}, both, {}, missing, missing, "run"),), {}, {})
+    (best, *_), seen = clues.waves("motor", "time"), clues.waves_in_time("load")
+    assert best.period == pytest.approx(PERIOD, rel=0.03)
+    assert clues.waves("load", "time")[0].share < best.share
+    assert (seen[0], seen[1:]) == (best, clues.waves("load", "time"))
+    assert clues.waves_in_time("motor") == [*clues.waves("motor", "time"), clues.waves("load", "time")[0]]
+
+
 @pytest.mark.parametrize(("turns", "apart"), [((4.4, 4.4, 4.4), True), ((4.4, 1.5, 1.5), False)])
 def test_two_recordings_at_least_tell_of_phases(turns: tuple[float, ...], apart: bool) -> None:
     """What is missing looks like a wave of any phase where that is hardly shorter than the way."""
