@@ -40,7 +40,8 @@ class WarmUpEffect(AbstractEffect):
 
     Without a temperature the viscous part need not drift as the dry part does: a lubricant gets thin before a contact
     gets smooth; and what warms it are its own losses, something else, or both. Recordings begin as warm as one another,
-    or each in its own way where they show that; also once it was accepted.
+    or each in its own way where they show that; also once it was accepted. What a base model has fitted in its place
+    may look like that, too: where they seem to, it is tried from beginnings alike as well.
     """
 
     name: ClassVar[str] = "warm_up"
@@ -74,10 +75,11 @@ class WarmUpEffect(AbstractEffect):
             if begun is not None:
                 part = replace(part, begun=BEGUN)
                 times = sorted(times, key=lambda one: abs(np.log(one / begun.time_constant)))
-            starts = {} if begun is None else begun.by_path(path)
+            starts = [{}] if begun is None else [begun.by_path(path), dict.fromkeys(begun.by_path(path), 0.0)]
             amplitudes = tuple({name: size} for name, size in sizes.items())
             trials = tuple(
-                Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share, **starts})
+                Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share, **start})
+                for start in starts
                 for one in times
                 for share in (0.0, 1.0)
             )

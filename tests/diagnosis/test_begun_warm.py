@@ -77,8 +77,11 @@ def test_static_points_know_no_beginning() -> None:
     assert begins_apart(DRIVE, "motor", known) is None
 
 
+SECOND = "motor.friction.warm_up.begun@run-2"
+
+
 def test_a_warm_up_that_was_accepted_gets_beginnings_where_recordings_show_them() -> None:
-    """Once; and begins with none at all."""
+    """Once; and begins with none at all. Where they are added at once, all may yet begin alike: both is tried."""
     apart, alike = (Clues(tracks(cold), NUMBERS, {"motor": 1.0}) for cold in ((0.5, 1.0, 0.2), (1.0, 1.0, 1.0)))
     effect = WarmUpEffect()
     plain = effect.augment(DRIVE, "motor", alike)
@@ -93,6 +96,8 @@ def test_a_warm_up_that_was_accepted_gets_beginnings_where_recordings_show_them(
     part = outright.drive.shaft("motor").friction.warm_up
     assert part is not None and isinstance(part.begun, Free) and part.begun.scope == "recording"
     assert all(trial.fixed["motor.friction.warm_up.begun@run-1"] == 0.0 for trial in outright.trials)
+    assert sum(trial.fixed[SECOND] > 0.0 for trial in outright.trials) == len(plain.trials)
+    assert sum(trial.fixed[SECOND] == 0.0 for trial in outright.trials) == len(plain.trials)
 
 
 SETTLES, CHANGE = 3.0, -0.4
