@@ -10,7 +10,7 @@ import numpy as np
 from friction_ocp.diagnosis.allowance import of_base
 from friction_ocp.diagnosis.easing import along, eased, finer
 from friction_ocp.diagnosis.excerpts import excerpts
-from friction_ocp.diagnosis.finer_steps import on_short_steps
+from friction_ocp.diagnosis.finer_steps import SEARCHING, on_short_steps
 from friction_ocp.diagnosis.fitted_model import AT_ODDS, FittedModel
 from friction_ocp.diagnosis.footing import Footing, footing
 from friction_ocp.diagnosis.kinks import freed
@@ -44,7 +44,7 @@ def fit_base(model: Model) -> FittedModel:
 
     Raises FrictionOcpError where no simulation of it holds.
     """
-    fitted = on_short_steps(_fitted_base(model))
+    fitted = on_short_steps(_fitted_base(model), SEARCHING)
     if not fitted.holds:
         where = f"{model.problem.path or model.problem.title}: diagnose"
         what = "the simulation of the model as it stands breaks down along the recordings"

@@ -218,12 +218,12 @@ def sharpened(bench: Bench) -> Bench:
     return replace(bench, footing=footing_document(found.footing), base_point=point_document(base), seat=Seat.of(found))
 
 
-def on_shorter_steps(bench: Bench, searching: bool) -> Bench:
+def on_shorter_steps(bench: Bench, shift: float) -> Bench:
     """Return the bench on integrator steps as short as the current model demands, the base model on the same.
 
-    As long as models compete, when that is `searching`, that is less than at the end.
+    Half of them may move a parameter by a `shift` in standard errors.
     """
-    found = on_short_steps(bench.current, searching)
+    found = on_short_steps(bench.current, shift)
     if found is bench.current:
         return bench
     base = fitted_on(bench.base, found.model)

@@ -7,27 +7,22 @@ from friction_ocp.diagnosis.kinks import freed
 from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.estimation.model import Model, with_step
 from friction_ocp.estimation.node_ends import worthwhile
-from friction_ocp.estimation.refinement import SHIFT, stepped_finely
+from friction_ocp.estimation.refinement import stepped_finely
 
 SEARCHING = 1.0
 """How far, in standard errors, half the step may move a parameter while models compete: no verdict hangs on that."""
-OF_MISSING = 0.001
-"""Share of what a model lacks that such a move may be worth in any case: a hundredth of what an addition must explain
-of it."""
 
 
-def on_short_steps(fitted: FittedModel, searching: bool = True) -> FittedModel:
+def on_short_steps(fitted: FittedModel, shift: float) -> FittedModel:
     """Fit again on shorter integrator steps where the error of those that a fit was made with shows or moves it.
 
-    It moves it where half the step shifts a parameter by more than SHIFT standard errors; as long as that is
-    `searching`, by more than SEARCHING and by more than OF_MISSING allows. The first step follows from the guesses, and
-    a spring may be far harder. Not where a model is astray, or compared by short predictions because others of it were:
-    there no step says more.
+    It moves it where half the step shifts a parameter by more than `shift` standard errors: the first step follows from
+    the guesses, and a spring may be far harder. Not where a model is astray, or compared by short predictions because
+    others of it were: there no step says more.
     """
     if fitted.astray or fitted.footing.predicted or not fitted.holds:
         return fitted
-    shift, share = (SEARCHING, OF_MISSING) if searching else (SHIFT, 0.0)
-    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift, share)
+    model, _ = stepped_finely(fitted.model, fitted.linear.program, fitted.linear.point, shift)
     return on_steps_of(model, fitted)
 
 

@@ -15,7 +15,7 @@ from friction_ocp.diagnosis.benchmark import beats
 from friction_ocp.diagnosis.contenders import completed_rivals, displaced, to_refit, with_outright
 from friction_ocp.diagnosis.crew import Crew
 from friction_ocp.diagnosis.excess import excess
-from friction_ocp.diagnosis.finer_steps import on_steps_of
+from friction_ocp.diagnosis.finer_steps import SEARCHING, on_steps_of
 from friction_ocp.diagnosis.fitted_model import FittedModel
 from friction_ocp.diagnosis.held_out import folds
 from friction_ocp.diagnosis.kinks import freed
@@ -31,6 +31,7 @@ from friction_ocp.diagnosis.worth import gain, grows, innovations, may_grow, req
 from friction_ocp.effects.effect import Key
 from friction_ocp.estimation.node_ends import UNIMPORTANT
 from friction_ocp.estimation.problem import Problem
+from friction_ocp.estimation.refinement import SHIFT
 from friction_ocp.execution.effort import limited
 from friction_ocp.statistics.execution import Execution
 
@@ -100,7 +101,7 @@ class Search:
         if self.accepted:
             with limited(self.allowance.limit):
                 self._sharpen()
-            self.bench = on_shorter_steps(self.bench, searching=False)
+            self.bench = on_shorter_steps(self.bench, SHIFT)
 
     def _add(self) -> None:
         for _ in range(MOST_ROUNDS):
@@ -274,7 +275,7 @@ class Search:
         self.tell("examining earlier additions again", 0.0)
         bench, keys = self._with(rival), [*self.accepted, rival.key]
         current, self.accepted = without_superfluous(bench, self.rounds, keys, self.level, self.rng, self.run)
-        self.bench = on_shorter_steps(bench.at(current), searching=True)
+        self.bench = on_shorter_steps(bench.at(current), SEARCHING)
         if innovations(self.bench.current).significant(self.level) and not self.allowance.exhausted():
             self._exchange()
 
@@ -323,10 +324,8 @@ class Search:
                 break
             self.bench, self.rounds = self.bench.at(done.accepted.fitted), [*self.rounds, done]
             self.accepted = [*self.accepted, done.accepted.key]
-            current, self.accepted = without_superfluous(
-                self.bench, self.rounds, self.accepted, self.level, self.rng, self.run
-            )
-            self.bench = self.bench.at(current)
+            found = without_superfluous(self.bench, self.rounds, self.accepted, self.level, self.rng, self.run)
+            self.bench, self.accepted = self.bench.at(found[0]), found[1]
 
     def _weigh_shapes(self) -> None:
         """Weigh the only addition against others, each in the shape that the recordings give it."""

@@ -51,13 +51,10 @@ def refined(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted
     return model, Fitted(replace(end, iterations=end.iterations + fitted.solution.iterations), program)
 
 
-def stepped_finely(
-    model: Model, program: Program, point: Point, shift: float = SHIFT, share: float = 0.0
-) -> tuple[Model, Program]:
+def stepped_finely(model: Model, program: Program, point: Point, shift: float = SHIFT) -> tuple[Model, Program]:
     """Return model and program with integrator steps that are short enough where a fit has ended; the same if they are.
 
-    Half of them may move no parameter by more than a `shift` in standard errors, or by what is worth a `share` of the
-    cost beyond that of noise. None is shorter than the first one,
+    Half of them may move no parameter by more than a `shift` in standard errors. None is shorter than the first one,
     that of the guesses, halved HALVINGS times: a mode that is faster may be absurd. Not where the problem states the
     step, or errors count by their size: those have no standard errors.
     """
@@ -71,8 +68,7 @@ def stepped_finely(
         stepped = (replace(item, grid=item.grid.with_step(finer.max_step)) for item in program.experiments)
         fine = replace(program, experiments=tuple(stepped))
         after = fine.linearise(point)
-        most = shift**2 * _misfit(program, system) + 2.0 * share * max(system.objective - 0.5 * program.samples, 0.0)
-        if not _moves(program, system, after, point, most) and not _shows(program, fine, system, point):
+        if not _moves(program, system, after, point, shift) and not _shows(program, fine, system, point):
             break
         model, program, system = finer, fine, after
     return model, program
@@ -89,18 +85,16 @@ def _misfit(program: Program, system: Linearisation) -> float:
     return max(1.0, 2.0 * system.objective / max(program.samples, 1))
 
 
-def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point, most: float) -> bool:
-    """Return whether Gauss-Newton steps on both are further apart in any free parameter than `most`.
-
-    That is the square of how far, in standard errors of noise alone: twice the cost that it is worth at least.
-    """
+def _moves(program: Program, before: Linearisation, after: Linearisation, point: Point, shift: float) -> bool:
+    """Return whether Gauss-Newton steps on both are further apart than a `shift` in any parameter that is free."""
     free = ~program.space.at_bounds(point.theta)
     if not np.any(free):
         return False
     reduced = [reduce_system(system, 1e-9) for system in (before, after)]
     told, _ = inverse_information(reduced[0].hessian[np.ix_(free, free)])
     move = told @ (reduced[1].gradient - reduced[0].gradient)[free]
-    return bool(np.max(move**2 / np.maximum(np.diag(told), 1e-300), initial=0.0) > most)
+    variance = np.maximum(np.diag(told), 1e-300) * _misfit(program, before)
+    return bool(np.max(np.abs(move) / np.sqrt(variance), initial=0.0) > shift)
 
 
 def _shows(coarse: Program, fine: Program, before: Linearisation, point: Point) -> bool:

@@ -11,16 +11,14 @@ from axes import COULOMB, CURRENT, INERTIA, POSITION, TORQUE_CONSTANT, VISCOUS, 
 from scipy.integrate import solve_ivp
 from stiff_axis import SIGMA0, stiff_problem
 
-from friction_ocp.diagnosis import base_fit, finer_steps
+from friction_ocp.diagnosis import base_fit
 from friction_ocp.diagnosis.bench import Bench, Seat, footing_document, point_document
 from friction_ocp.drive.parts import Channel as Sensor
 from friction_ocp.drive.parts import Controller, Gravity
-from friction_ocp.estimation import refinement
 from friction_ocp.estimation.fit import fit, settled
 from friction_ocp.estimation.influence import influence
 from friction_ocp.estimation.model import Model, prepare
 from friction_ocp.estimation.modes import STEP_PER_RADIAN
-from friction_ocp.estimation.refinement import stepped_finely
 from friction_ocp.parameters import Free
 from friction_ocp.recording.recording import Channel, Recording
 
@@ -74,19 +72,16 @@ def test_a_coarse_encoder_and_a_stated_step_are_left_alone() -> None:
 
 
 TORQUE, INTERVAL = 0.5, 0.02
-RIPPLE = 0.006
-"""Of an encoder, rad."""
 
 
-def swing(inertia: float | Free, noise: float, ripple: float = 0.0) -> Model:
-    """Return a pendulum that swings freely for 4 s, its angle seen by an encoder of this noise that has a ripple."""
+def swing(inertia: float | Free, noise: float) -> Model:
+    """Return a pendulum that swings freely for 4 s, its angle seen by an encoder of this noise."""
     time = np.arange(0.0, 4.0, INTERVAL)
 
     def rates(_: float, state: np.ndarray) -> list[float]:
         return [state[1], -TORQUE / INERTIA * np.sin(state[0])]
 
     true = solve_ivp(rates, (0.0, 4.0), [1.0, 0.0], t_eval=time, rtol=1e-10, atol=1e-10).y[0]
-    true += ripple * np.sin(40.0 * time)
     seen = Channel("position", time, true + noise * np.random.default_rng(5).standard_normal(time.size), "rad")
     still = Channel("current", time, 0.0 * time, "A")
     drive = axis(inertia=inertia, gravity=Gravity(TORQUE))
@@ -102,19 +97,6 @@ def test_a_first_step_longer_than_the_samples_are_apart_is_shortened() -> None:
     std_error = 1.0 / np.sqrt(influence(fitted.program, fitted.solution.point).information[0, 0])
     assert model.max_step < 0.5 * INTERVAL
     assert abs(fitted.solution.point.theta[0] - INERTIA) < FAR * std_error
-
-
-def test_what_steps_move_may_be_worth_a_share_of_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where that is asked for: an error of the step that is small beside what a model lacks decides nothing.
-
-    Whether residuals show it is another question.
-    """
-    monkeypatch.setattr(refinement, "HALVED", np.inf)
-    model = swing(Free(INERTIA), 3e-4, ripple=RIPPLE)
-    rough = fit(model)
-    program, point = rough.program, rough.solution.point
-    assert stepped_finely(model, program, point, shift=1.0)[0].max_step < model.max_step
-    assert stepped_finely(model, program, point, shift=1.0, share=1.0)[0] is model
 
 
 def test_steps_are_shortened_where_nothing_is_fitted() -> None:
@@ -147,7 +129,7 @@ def test_models_of_a_diagnosis_are_compared_on_steps_that_suffice(fine: Model, m
 
     Asked as strictly as an identification; the short segments of a diagnosis hang less on the step.
     """
-    monkeypatch.setattr(finer_steps, "SEARCHING", STILL)
+    monkeypatch.setattr(base_fit, "SEARCHING", STILL)
     base = base_fit.fit_base(fine)
     assert base.model.max_step < fine.max_step
     assert base.missed == pytest.approx(1.0, abs=0.1)
