@@ -83,9 +83,10 @@ class LinearRecording:
         self.seen = np.isfinite(self.item.measured)
         time = np.arange(self.item.grid.time.size)
         self.segment = self.cut.owner(time)
+        self.alike = _alike(self.segment)
         errors = program.sample_errors(index, self.y)
         self.scaling = np.sqrt(self.loss.weight(errors)) / self.noise
-        self.dy = result.dy[:, :, : self.states] * self.scaling[:, :, None]
+        self.dy = np.where(self.seen[:, :, None], result.dy[:, :, : self.states] * self.scaling[:, :, None], 0.0)
         self.dend = result.dend[:, :, : self.states]
         _, self.slope = program.space.numbers_and_slope(point.theta, self.item.name)
         self._factor()
@@ -121,7 +122,7 @@ class LinearRecording:
         y = np.where(self.seen[:, :, None], by_y, 0.0).reshape(self.seen.size, count)
         ends = np.zeros((0, count))
         if self.cut.gap_weight is not None and self.cut.count > 1:
-            weighted = np.einsum("kij,kjp->kip", self.cut.gap_weight, by_end)
+            weighted = self.cut.gap_weight @ by_end
             ends = weighted.reshape((self.cut.count - 1) * self.states, count)
         rest = np.zeros((self._start_rows, count)) if starts is None else starts.reshape(self._start_rows, count)
         return np.concatenate([y, ends, rest])
@@ -154,12 +155,10 @@ class LinearRecording:
     def _applied(self, moved: FloatArray) -> FloatArray:
         """Return the change of all rows for moved nodes (segments, s, k)."""
         count = moved.shape[2]
-        y = np.einsum("nos,nsk->nok", self.dy, moved[self.segment])
-        y = np.where(self.seen[:, :, None], y, 0.0).reshape(self.seen.size, count)
-        parts = [y]
+        parts = [self._by_sample(moved).reshape(self.seen.size, count)]
         if self.cut.gap_weight is not None and self.cut.count > 1:
-            gap = np.einsum("kij,kjp->kip", self.dend[:-1], moved[:-1]) - moved[1:]
-            weighted = np.einsum("kij,kjp->kip", self.cut.gap_weight, gap)
+            gap = self.dend[:-1] @ moved[:-1] - moved[1:]
+            weighted = self.cut.gap_weight @ gap
             parts.append(weighted.reshape((self.cut.count - 1) * self.states, count))
         if self.cut.start_weight is not None:
             tied = self.cut.tied
@@ -171,14 +170,13 @@ class LinearRecording:
         """Return (segments, s, k) the gradient by the nodes of columns of rows."""
         count, (n, outputs) = columns.shape[1], self.seen.shape
         y = columns[: n * outputs].reshape(n, outputs, count)
-        by_sample = np.einsum("nos,nok->nsk", self.dy, np.where(self.seen[:, :, None], y, 0.0))
-        gradient = np.add.reduceat(by_sample, self.cut.first[:-1], axis=0)
+        gradient = self._by_segment(np.where(self.seen[:, :, None], y, 0.0))
         at = n * outputs
         if self.cut.gap_weight is not None and self.cut.count > 1:
             size = (self.cut.count - 1) * self.states
             gap = columns[at : at + size].reshape(-1, self.states, count)
-            pulled = np.einsum("kji,kjp->kip", self.cut.gap_weight, gap)
-            gradient[:-1] += np.einsum("kji,kjp->kip", self.dend[:-1], pulled)
+            pulled = self.cut.gap_weight.swapaxes(1, 2) @ gap
+            gradient[:-1] += self.dend[:-1].swapaxes(1, 2) @ pulled
             gradient[1:] -= pulled
             at += size
         if self.cut.start_weight is not None:
@@ -186,6 +184,25 @@ class LinearRecording:
             rest = columns[at:].reshape(-1, self.states, count)
             np.add.at(gradient, tied, self.cut.start_weight[tied][:, :, None] * rest)
         return gradient
+
+    def _by_sample(self, moved: FloatArray) -> FloatArray:
+        """Return (n, outputs, k) what moved nodes (segments, s, k) do to scaled outputs that were seen."""
+        many, size = self.alike
+        at, (_, outputs, states) = many * size, self.dy.shape
+        whole = self.dy[:at].reshape(many, size * outputs, states) @ moved[:many]
+        rest = self.dy[at:] @ moved[self.segment[at:]]
+        return np.concatenate([whole.reshape(at, outputs, moved.shape[2]), rest])
+
+    def _by_segment(self, y: FloatArray) -> FloatArray:
+        """Return (segments, s, k) sums over samples of what nodes do to them, times y (n, outputs, k)."""
+        many, size = self.alike
+        at, (_, outputs, states) = many * size, self.dy.shape
+        whole = self.dy[:at].reshape(many, size * outputs, states).swapaxes(1, 2)
+        sums = whole @ y[:at].reshape(many, size * outputs, y.shape[2])
+        if many == self.cut.count:
+            return sums
+        rest = self.dy[at:].swapaxes(1, 2) @ y[at:]
+        return np.concatenate([sums, np.add.reduceat(rest, self.cut.first[many:-1] - at, axis=0)])
 
     def _factor(self) -> None:
         """Factorise the block-tridiagonal normal matrix of the nodes."""
@@ -202,14 +219,13 @@ class LinearRecording:
     def _factors(self, cut: Segments) -> tuple[FloatArray, FloatArray]:
         """Return (segments, states) scales of the nodes, and the Cholesky factors of their scaled normal matrix."""
         count, states, index = cut.count, self.states, np.arange(int(self.states))
-        seen = np.where(self.seen[:, :, None], self.dy, 0.0)
-        diagonal = np.add.reduceat(np.einsum("noi,noj->nij", seen, seen), cut.first[:-1], axis=0)
+        diagonal = self._by_segment(self.dy)
         upper = np.zeros((max(count - 1, 0), states, states))
         if cut.gap_weight is not None and count > 1:
-            forward = np.einsum("kij,kjl->kil", cut.gap_weight, self.dend[:-1])
-            diagonal[:-1] += np.einsum("kji,kjl->kil", forward, forward)
-            diagonal[1:] += np.einsum("kji,kjl->kil", cut.gap_weight, cut.gap_weight)
-            upper = -np.einsum("kji,kjl->kil", forward, cut.gap_weight)
+            forward = cut.gap_weight @ self.dend[:-1]
+            diagonal[:-1] += forward.swapaxes(1, 2) @ forward
+            diagonal[1:] += cut.gap_weight.swapaxes(1, 2) @ cut.gap_weight
+            upper = -forward.swapaxes(1, 2) @ cut.gap_weight
         if cut.start_weight is not None:
             diagonal[:, index, index] += cut.start_weight**2
         diagonal[:, index, index] += 1e-14 * (1.0 + diagonal[:, index, index])
@@ -242,6 +258,13 @@ class LinearRecording:
             np.concatenate([channel, kinds]).astype(np.int64),
             np.concatenate([node, later]).astype(np.int64),
         )
+
+
+def _alike(segment: IntArray) -> tuple[int, int]:
+    """Return how many segments from the first on have the same number of samples, and that number."""
+    sizes = np.bincount(segment)
+    other = np.flatnonzero(sizes != sizes[0])
+    return int(other[0]) if other.size else sizes.size, int(sizes[0])
 
 
 def _banded_factors(diagonal: FloatArray, upper: FloatArray) -> FloatArray:

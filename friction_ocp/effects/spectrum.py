@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy.ndimage as _ndimage  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.simulation.grid import FloatArray, IntArray
 
 ndimage: Any = _ndimage  # its own types are incomplete
+
+ComplexArray = npt.NDArray[np.complex128]
 
 PEAKS = 6
 """Periods that are tried."""
@@ -21,15 +24,28 @@ NEIGHBOURS = 41
 
 
 def spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """Return the share of squares that a wave of each frequency takes, at uneven places (Lomb 1976)."""
+    """Return what a wave of each of evenly spaced frequencies takes of squares at uneven places (Lomb 1976)."""
+    if not frequencies.size:
+        return np.zeros(0)
     plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
-    power: list[FloatArray] = []
+    pulled, squares = factor * plain, factor**2
+    whole, power = float(np.sum(squares)), list[FloatArray]()
     for some in np.array_split(frequencies, max(1, frequencies.size // LINES)):
-        turns = 2.0 * np.pi * some[:, None] * place
-        basis = factor * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        gram, pull = basis @ basis.swapaxes(1, 2), basis @ plain
-        power.append(np.einsum("kp,kpq,kq->k", pull, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), pull))
+        waves = _waves(place, some)
+        pull, twice = waves @ pulled, (waves * waves) @ squares
+        gram = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]]).transpose(2, 0, 1)
+        both = np.column_stack([pull.real, pull.imag])
+        power.append(np.einsum("kp,kpq,kq->k", both, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), both))
     return np.concatenate(power)
+
+
+def _waves(place: FloatArray, frequencies: FloatArray) -> ComplexArray:
+    """Return (frequencies, n) waves of evenly spaced frequencies at some places, each from the one before."""
+    turns = 2.0j * np.pi * place
+    waves = np.empty((frequencies.size, place.size), dtype=complex)
+    waves[0] = np.exp(turns * frequencies[0])
+    waves[1:] = np.exp(turns * (frequencies[-1] - frequencies[0]) / max(frequencies.size - 1, 1))
+    return np.multiply.accumulate(waves, axis=0)
 
 
 def without(values: FloatArray, shapes: FloatArray) -> FloatArray:
