@@ -75,7 +75,8 @@ class WarmUpEffect(AbstractEffect):
             if begun is not None:
                 part = replace(part, begun=BEGUN)
                 times = sorted(times, key=lambda one: abs(np.log(one / begun.time_constant)))
-            starts = [{}] if begun is None else [begun.by_path(path), dict.fromkeys(begun.by_path(path), 0.0)]
+            own = {} if begun is None else begun.by_path(path)
+            starts = [own] if begun is None else [own, dict.fromkeys(own, 0.0)]
             amplitudes = tuple({name: size} for name, size in sizes.items())
             trials = tuple(
                 Trial(amplitudes, {f"{path}.time_constant": one, f"{path}.loss_share": share, **start})
