@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friction_ocp.estimation.around_kinks import smoothed
 from friction_ocp.estimation.composite import solve_composite
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.first_nodes import suggested_point
@@ -85,7 +86,7 @@ def _around(model: Model, fitted: Fitted, phases: Phases) -> Fitted:
         if (number > 0 and best.smooth) or not isinstance(program.loss, Squares):
             break
         watch = phases.begin(f"detour, smoothing {width:g}")
-        rounded = replace(program, width=width * model.speed_scale)
+        rounded = smoothed(model, program, width)
         between = solve_gauss_newton(rounded, best.point, COARSE, watch)
         end = final_solver(model)(program, between.point, limits(model), watch)
         iterations = best.iterations + between.iterations + end.iterations

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from friction_ocp.estimation.around_kinks import smoothed
 from friction_ocp.estimation.elimination import reduce_system
 from friction_ocp.estimation.gauss_newton import Watch, solve_gauss_newton
 from friction_ocp.estimation.model import Model
@@ -135,7 +135,7 @@ def _fresh(program: Program, point: Point) -> Point:
 
 def _rounded(model: Model, width: float, program: Program, point: Point) -> Point:
     """Return the point with nodes that friction with a hardly smoothed sign leads to."""
-    rounded = replace(program, width=width * model.speed_scale)
+    rounded = smoothed(model, program, width)
     return solve_nodes(program, solve_nodes(rounded, point, NODE_STEPS, NEGLIGIBLE), NODE_STEPS, NEGLIGIBLE)
 
 
