@@ -19,7 +19,7 @@ from friction_ocp.recording.foreign import ForeignFile, Signal, Values, check_si
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
-from friction_ocp.recording.stamps import past_midnight, seconds_of
+from friction_ocp.recording.stamps import past_midnight
 
 _ROWS_AT_ONCE = 50_000
 _TOLD = 10
@@ -92,7 +92,8 @@ def _numbers_of_all(path: Path, layout: Layout, decimal: str | None, odd: _OddRo
 
 def _values(layout: Layout, column: int, cells: Sequence[str], decimal: str | None) -> tuple[Values, list[int]]:
     """Return the numbers in cells of a column, dates as s, and the rows of cells that are neither."""
-    return seconds_of(cells, layout.origin) if column in layout.stamped else numbers(cells, decimal)
+    writing = layout.stamped.get(column)
+    return numbers(cells, decimal) if writing is None else writing.seconds_of(cells, layout.origin)
 
 
 def _fault(layout: Layout, column: int, where: str, place: str, cell: str, decimal: str | None) -> Finding:

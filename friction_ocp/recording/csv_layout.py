@@ -13,10 +13,12 @@ from pathlib import Path
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv_cells import is_missing, is_number
 from friction_ocp.recording.header_unit import header_unit
-from friction_ocp.recording.stamps import are_dates, first_instant, is_stamp
+from friction_ocp.recording.stamps import Writing, first_instant, is_stamp, writing_of
 
 _DELIMITERS = ("\t", ";", ",", " ")
 _SNIFFED_LINES = 200
+_TAIL = 65_536
+"""Bytes at the end of a file in which its last line is looked for."""
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -32,15 +34,15 @@ class Layout:
     first_row: int
     """Line of the first row of numbers, from 1."""
     encoding: str
-    stamped: Mapping[int, bool]
-    """Columns of dates (true) or times of day (false)."""
+    stamped: Mapping[int, Writing]
+    """Columns of dates or times of day."""
     origin: int
     """The earliest of their first instants, ns since 1970; 0 where there are no dates."""
 
     @property
     def times_of_day(self) -> list[int]:
         """Columns of times of day, which begin again at midnight."""
-        return [column for column, dated in self.stamped.items() if not dated]
+        return [column for column, writing in self.stamped.items() if not writing.dated]
 
 
 def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -60,8 +62,10 @@ def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None =
         raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
     names, units, first_row = _header(splits[best])
     stamps = _stamps(splits[best], len(names))
-    origin = first_instant(list(stamps.values()))
-    stamped = {column: are_dates(cells) for column, cells in stamps.items()}
+    last = _split(_last_line(path, encoding), best) if stamps else []
+    ends = last if len(last) == len(names) else [""] * len(names)
+    stamped = {column: writing_of([*cells, ends[column]]) for column, cells in stamps.items()}
+    origin = first_instant([(stamped[column], cells) for column, cells in stamps.items()])
     return Layout(best, names, units, first_row + 1, encoding, stamped, origin)
 
 
@@ -75,6 +79,17 @@ def _encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return "cp1252"
     return "utf-8-sig"
+
+
+def _last_line(path: Path, encoding: str) -> str:
+    """Return the last line that is not empty; "" where it is longer than what is looked at."""
+    with path.open("rb") as file:
+        mark = file.read(2)
+        file.seek(max(0, path.stat().st_size - _TAIL) // 2 * 2)
+        tail = file.read()
+    wide = {UTF16_MARKS[0]: "utf-16-le", UTF16_MARKS[1]: "utf-16-be"}
+    lines = tail.decode(wide.get(mark, encoding), errors="replace").splitlines()[1:]
+    return next((line for line in reversed(lines) if line.strip()), "")
 
 
 def _split(line: str, delimiter: str) -> list[str]:
@@ -112,7 +127,12 @@ def _stamps(rows: Sequence[Sequence[str]], width: int) -> dict[int, list[str]]:
 
 
 def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
-    return sum(is_number(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
+    """Return how many numbers there are in the rows of the table; a date with its time is as many as it has."""
+    return sum(_numbers_in(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
+
+
+def _numbers_in(cell: str) -> int:
+    return 1 if is_number(cell) else len(re.findall(r"\d+", cell)) if is_stamp(cell) else 0
 
 
 def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...], int]:

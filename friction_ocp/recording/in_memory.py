@@ -9,14 +9,17 @@ from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.stamps import as_seconds
 
 
-def in_memory(columns: Mapping[str, Values], summary: str) -> ForeignFile:
-    """Return such a file; a name may state the unit, and columns of dates become s since the earliest of the first."""
+def in_memory(columns: Mapping[str, Values], summary: str, units: Mapping[str, str] = {}) -> ForeignFile:
+    """Return such a file, and columns of dates as s since the earliest of the first; a name may state the unit, too."""
     found, dates, origin = as_seconds(columns)
     names = tuple(found)
-    signals = tuple(_signal(name, values, name in dates) for name, values in found.items())
+    signals = tuple(
+        _signal(name, values, "s" if name in dates else units.get(name) or header_unit(name))
+        for name, values in found.items()
+    )
     return ForeignFile(signals, lambda wanted: {k: found[names[k]] for k in wanted}, no_clock, summary, instant(origin))
 
 
-def _signal(name: str, values: Values, is_date: bool) -> Signal:
+def _signal(name: str, values: Values, unit: str) -> Signal:
     text = str(values[0]) if values.dtype.kind == "U" and values.size == 1 else ""
-    return Signal(name, len(values), "s" if is_date else header_unit(name), numeric=is_real(values), text=text)
+    return Signal(name, len(values), unit, numeric=is_real(values), text=text)

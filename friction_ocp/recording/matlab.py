@@ -1,10 +1,12 @@
-"""MATLAB, version 5 through SciPy and version 7.3 through matlab_hdf5.py: vectors, matrices, fields of structs."""
+"""MATLAB, version 5 through SciPy, 7.3 through matlab_hdf5.py, tables and other objects through matlab_objects.py."""
 
 from __future__ import annotations
 
+import warnings
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,6 +16,8 @@ from friction_ocp.recording.foreign import ForeignFile, Values, reading, refuse_
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.in_memory import in_memory
 from friction_ocp.recording.matlab_hdf5 import is_hdf5, open_hdf5
+from friction_ocp.recording.matlab_objects import columns_with_objects, has_objects, has_objects_73
+from friction_ocp.recording.matrix_columns import matrix_columns
 
 KIND = "a MATLAB file"
 MAX_DEPTH = 20
@@ -26,19 +30,32 @@ def open_matlab(path: Path, import_map: ImportMap | None = None) -> Generator[Fo
 
     A matrix has columns `name[0]`, `name[1]`, a struct fields `name.field`, a cell or struct array elements `name{0}`.
     """
-    if is_hdf5(path):
+    newer = is_hdf5(path)
+    with reading(path, KIND):
+        if not newer:
+            refuse_large(path, sum(_declared_sizes(path)), "variables")
+        objects = has_objects_73(path) if newer else has_objects(path)
+        series, hint = columns_with_objects(path) if objects else ([], "")
+    if series:
+        columns = {name: values for name, values, _ in series}
+        yield in_memory(columns, f"MATLAB with objects{hint}", {name: unit for name, _, unit in series})
+    elif newer:
         with open_hdf5(path) as file:
-            yield file
-        return
+            yield replace(file, summary=file.summary + hint)
+    else:
+        yield in_memory(_variables(path), "MATLAB up to version 7" + hint)
+
+
+def _variables(path: Path) -> dict[str, Values]:
+    """Return the series in the variables of a version 5 file that are no objects."""
     from scipy import io as _io  # pyright: ignore[reportMissingTypeStubs]
 
     io: Any = _io
-    with reading(path, KIND):
-        refuse_large(path, sum(_declared_sizes(path)), "variables")
+    with reading(path, KIND), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of objects, which have no names there
         content: dict[str, Any] = io.loadmat(path, simplify_cells=True)
-    variables = [(name, value) for name, value in content.items() if not name.startswith("__")]
-    columns = dict(pair for name, value in variables for pair in _columns(name, value, 0))
-    yield in_memory(columns, "MATLAB up to version 7")
+    variables = [(name, value) for name, value in content.items() if not name.startswith("__") and name != "None"]
+    return dict(pair for name, value in variables for pair in _columns(name, value, 0))
 
 
 def _declared_sizes(path: Path) -> Iterator[int]:
@@ -76,14 +93,3 @@ def _columns(name: str, value: Any, depth: int) -> Iterator[tuple[str, Values]]:
         yield from matrix_columns(name, cast(Values, value))
     elif isinstance(value, int | float | str):
         yield name, np.atleast_1d(np.asarray(value))
-
-
-def matrix_columns(name: str, values: Values) -> Iterator[tuple[str, Values]]:
-    """Yield a vector as it is, a matrix column by column."""
-    flat = np.squeeze(values)
-    if flat.ndim <= 1:
-        yield name, np.atleast_1d(flat)
-    elif flat.ndim == 2:
-        rows = flat if flat.shape[0] >= flat.shape[1] else flat.T
-        for k in range(rows.shape[1]):
-            yield f"{name}[{k}]", rows[:, k]

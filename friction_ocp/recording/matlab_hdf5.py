@@ -120,7 +120,8 @@ def _series(node: Any, name: str) -> Iterator[_Series]:
 def _signal(node: Any, name: str, samples: int) -> Signal:
     unit = attribute_text(next((node.attrs[key] for key in _UNIT_KEYS if key in node.attrs), ""))
     is_text = node.attrs.get("MATLAB_class", b"") in (b"char", "char")
-    numeric = node.dtype.kind in "biuf" and not is_text and not node.attrs.get("MATLAB_empty", 0)
+    is_other = node.attrs.get("MATLAB_empty", 0) or node.attrs.get("MATLAB_object_decode", 0)
+    numeric = node.dtype.kind in "biuf" and not is_text and not is_other
     return Signal(name, samples, unit or header_unit(name), numeric=numeric, text=_text(node) if is_text else "")
 
 

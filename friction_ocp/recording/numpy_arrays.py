@@ -13,7 +13,7 @@ import numpy as np
 from friction_ocp.recording.foreign import ForeignFile, Values, reading, refuse_large
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.in_memory import in_memory
-from friction_ocp.recording.matlab import matrix_columns
+from friction_ocp.recording.matrix_columns import matrix_columns
 
 KIND = "a NumPy file"
 

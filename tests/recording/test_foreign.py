@@ -168,8 +168,8 @@ def test_every_extra_that_is_named_exists() -> None:
     """The install commands name extras of this project; `formats` has all of them."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    assert extras["formats"] == ["friction-ocp[parquet,mdf,ros,tdms]"]
-    assert all(len(extras[name]) == 1 for name in ("parquet", "mdf", "ros", "tdms"))
+    assert extras["formats"] == ["friction-ocp[parquet,mdf,ros,tdms,matlab]"]
+    assert all(len(extras[name]) == 1 for name in ("parquet", "mdf", "ros", "tdms", "matlab"))
 
 
 def refusal(case: ForeignCase, folder: Path, **changes: Any) -> str:
