@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,12 +106,27 @@ def _is_time(signal: Signal) -> bool:
 def _guessed_axis(k: int, signal: Signal, signals: Sequence[Signal], times: dict[int, _Axis]) -> _Axis:
     """Return the likely times of a signal that has none of its own: a column that is as long.
 
-    That is the nearest one before it among those that are known to be times, else the first of all.
+    Units tell better than names which columns are times. Of several, one of the same struct or table comes first,
+    then the nearest one before it.
     """
     fitting = [j for j in times if signals[j].samples == signal.samples]
-    known = [j for j in fitting if _is_time(signals[j])]
-    before = [j for j in known if j <= k]
-    return times[before[-1] if before else (*known, *fitting)[0]] if fitting else _NO_TIMES
+    known = [j for j in fitting if _is_time(signals[j])] or [j for j in fitting if _is_called_time(signals[j])]
+    if not fitting:
+        return _NO_TIMES
+    if not known:
+        return times[fitting[0]]
+    beside = [j for j in known if _whole(signals[j]) == _whole(signal)] or known
+    return times[next((j for j in reversed(beside) if j <= k), beside[0])]
+
+
+def _is_called_time(signal: Signal) -> bool:
+    """Whether the name of a signal says that it is a time."""
+    return bool(re.match(r"t$|t[\W_]|time|stamp", signal.name.rpartition(".")[2].lower()))
+
+
+def _whole(signal: Signal) -> str:
+    """Return the struct or table that a signal is a part of; "" for one that stands alone."""
+    return signal.name.rpartition(".")[0]
 
 
 def _listed(signal: Signal, axis: _Axis, values: FloatArray | None) -> Listed:

@@ -19,6 +19,7 @@ from friction_ocp.recording.import_recording import import_recording, inspect_fi
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # of pandas, about an option that it sets
     matio: Any = importlib.import_module("matio")
+    matio_class: Any = importlib.import_module("matio.utils.matclass").MatlabOpaque
 VERSIONS = ("v7", "v7.3")
 STEP = np.timedelta64(100, "us")
 MAP = (
@@ -78,6 +79,20 @@ def test_tables_in_structs_and_cells_are_listed(tmp_path: Path, version: str) ->
     }
     assert {"bench.log.x", "bench.log.count", "bench.mass", "runs{0}", "runs{1}.x", "plain"} <= set(shown)
     assert shown["bench.log.when"][:2] == ["s", "5"] and shown["bench.log.note"][-2:] == ["no", "numbers"]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_other_objects_are_listed_by_their_properties(tmp_path: Path, version: str) -> None:
+    """A `timeseries` shows what it keeps; by their names, the times of each are those beside its data."""
+    runs = np.empty((1, 2), dtype=object)
+    for k in range(2):
+        inner = matio_class({"Increment": np.array([[1e-3]])}, "tsdata.timemetadata")
+        kept = {"Data_": np.arange(5.0)[:, None], "Time_": (k + 1) * 1e-3 * np.arange(5.0)[:, None], "TimeInfo_": inner}
+        runs[0, k] = matio_class(kept, "timeseries")
+    shown = inspect_file(write(tmp_path / "log.mat", version, runs=runs))
+    rows = {line.split()[1]: line.split()[2:] for line in shown.splitlines() if line[:1].isdigit()}
+    assert [rows[f"runs{{{k}}}.Data_"][:3] for k in range(2)] == [["5", "1000", "0.004"], ["5", "500", "0.008"]]
+    assert rows["runs{1}.TimeInfo_.Increment"] == ["1", "0.001", "0.001"]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
