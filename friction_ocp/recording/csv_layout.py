@@ -60,7 +60,7 @@ def sniff_layout(path: Path, delimiter: str | None = None, decimal: str | None =
     if counts[best] == 0:
         allowed = "at least two columns, separated by comma, semicolon, tab or space"
         raise FrictionOcpError(Finding(str(path), "there are no rows of numbers", allowed, "state the delimiter"))
-    names, units, first_row = _header(splits[best])
+    names, units, first_row = header_of(splits[best])
     stamps = _stamps(splits[best], len(names))
     last = _split(_last_line(path, encoding), best) if stamps else []
     ends = last if len(last) == len(names) else [""] * len(names)
@@ -100,7 +100,7 @@ def _split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for row in csv.reader([line], delimiter=delimiter, skipinitialspace=True) for cell in row]
 
 
-def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
+def rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
     """Return which lines are rows of the table: as wide as most lines with numbers, with the usual first number.
 
     The usual first number (the time, mostly) tells rows from settings above them, such as "rate, 1000".
@@ -121,27 +121,27 @@ def _rows_of_numbers(rows: Sequence[Sequence[str]]) -> list[int]:
 
 def _stamps(rows: Sequence[Sequence[str]], width: int) -> dict[int, list[str]]:
     """Return the cells of columns that mostly hold dates or times of day."""
-    table = [rows[index] for index in _rows_of_numbers(rows)]
+    table = [rows[index] for index in rows_of_numbers(rows)]
     cells = {column: [row[column] for row in table if not is_missing(row[column])] for column in range(width)}
     return {column: stated for column, stated in cells.items() if 2 * sum(map(is_stamp, stated)) > len(stated)}
 
 
 def _count_numbers(rows: Sequence[Sequence[str]]) -> int:
     """Return how many numbers there are in the rows of the table; a date with its time is as many as it has."""
-    return sum(_numbers_in(cell) for index in _rows_of_numbers(rows) for cell in rows[index])
+    return sum(_numbers_in(cell) for index in rows_of_numbers(rows) for cell in rows[index])
 
 
 def _numbers_in(cell: str) -> int:
     return 1 if is_number(cell) else len(re.findall(r"\d+", cell)) if is_stamp(cell) else 0
 
 
-def _header(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+def header_of(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     """Return the names of the columns, the units in a line of their own, and the index of the first row of numbers.
 
     The header is among the lines right above the numbers that have as many cells: the first of those with the most
     names in them, as what stands above it may be padded to its width. A line of units may follow it.
     """
-    table = _rows_of_numbers(rows)
+    table = rows_of_numbers(rows)
     first, width = table[0], len(rows[table[0]])
     padded = all(not rows[index][-1] for index in table)
     lines: list[list[str]] = []

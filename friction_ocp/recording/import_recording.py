@@ -23,6 +23,7 @@ from friction_ocp.recording.parquet import open_parquet
 from friction_ocp.recording.probe import probed
 from friction_ocp.recording.recording import Recording
 from friction_ocp.recording.rosbag import open_rosbag
+from friction_ocp.recording.spreadsheet import open_spreadsheet
 from friction_ocp.recording.static_points import StaticPoints
 from friction_ocp.recording.table import recording_of, static_points_of
 from friction_ocp.recording.tdms import open_tdms
@@ -49,6 +50,11 @@ READERS: Mapping[str, Opener] = {
     ".npz": open_numpy,
     ".log": open_csv,
     ".asc": open_csv,
+    ".xlsx": open_spreadsheet,
+    ".xlsm": open_spreadsheet,
+    ".xlsb": open_spreadsheet,
+    ".xls": open_spreadsheet,
+    ".ods": open_spreadsheet,
 }
 """Reader by the suffix of the file; a further format is a further line."""
 _HEAD = 4096

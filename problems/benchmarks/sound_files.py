@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ SUFFIXES: Mapping[str, str] = {
     "rosbag": ".db3",
     "json": ".json",
     "numpy": ".npz",
+    "spreadsheet": ".xlsx",
+    "matlab_objects": ".mat",
 }
 """Readers, and the suffix of what they read."""
 TEXT = ("problem", "map", "csv", "json")
@@ -81,6 +84,8 @@ MAPS: Mapping[str, str] = {
         "rosbag": "channels: {x: {column: 0, unit: A}, y: {column: 1, unit: V}}",
         "json": _TIME + f"channels: {{x: {{column: 1, {_UNIT}}}}}",
         "numpy": _TIME + "channels: {x: {column: 1, unit: A}}",
+        "spreadsheet": "time: {column: date}\nchannels: {x: {column: 1}}",
+        "matlab_objects": "time: {column: log.Time}\nchannels: {x: {column: log.x, unit: A}}",
     }.items()
 }
 """The map of each format's sound file."""
@@ -228,11 +233,37 @@ def _numpy(folder: Path) -> list[Path]:
     return [folder / "plain.npz", folder / "packed.npz", folder / "array.npz", folder / "dated.npz"]
 
 
+def _spreadsheet(folder: Path) -> list[Path]:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    sheet = book.create_sheet("log")
+    sheet.append(["rig", 7])
+    sheet.append(["date", "x [A]", "note"])
+    for date, value in zip(_dates().astype("datetime64[us]").tolist(), _time().tolist(), strict=True):
+        sheet.append([date, value, "a"])
+    book.save(folder / "log.xlsx")
+    return [folder / "log.xlsx"]
+
+
+def _matlab_objects(folder: Path) -> list[Path]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pandas, about an option that the library sets
+        import matio
+        import pandas as pd
+
+        table = pd.DataFrame({"x": np.sin(_time()), "note": ["a"] * 60}, index=pd.Index(_dates(), name="Time"))
+        for name in ("v7", "v7.3"):
+            matio.save_to_mat(str(folder / f"{name}.mat"), {"log": table, "plain": _time()}, version=name)
+    return [folder / "v7.mat", folder / "v7.3.mat"]
+
+
 _JSON = json.dumps({"t": _time().tolist(), "x [deg]": np.sin(_time()).tolist(), "mass": 0.5, "curve": {"1": 2, "3": 4}})
 _RECORDS = json.dumps([{"t": float(t), "x": float(np.sin(t)), "arm": {"y": [1, None]}} for t in _time()])
 _CSV = "".join(f"{t:.2f},{np.sin(t):.6f},{k % 7}\n" for k, t in enumerate(_time()))
 _DATED = "date;x\n" + "".join(f"30.11.2026 23:59:{59.0 + t:06.3f};{np.sin(t):.6f}\n" for t in _time())
 _DATED_RECORDS = json.dumps([{"t": f"{date}Z", "x": 1.0} for date in _dates()])
+_AMERICAN = "date,x\n" + "".join(f"11/30/2026 11:59:{t:06.3f} PM,{np.sin(t):.6f}\n" for t in _time())
 _GERMAN = "# Bench\nt [s];x [deg];n\n" + _CSV.replace(",", ";").replace(".", ",")
 
 WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
@@ -240,7 +271,7 @@ WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
     "map": _texts("map.yaml", MAP),
     "recording": lambda folder: [_recording(folder / "run.h5")],
     "static": _static,
-    "csv": _texts("log.csv", "t,x [deg],n\n" + _CSV, _CSV, _GERMAN, _DATED),
+    "csv": _texts("log.csv", "t,x [deg],n\n" + _CSV, _CSV, _GERMAN, _DATED, _AMERICAN),
     "hdf5": _hdf5,
     "matlab5": _matlab5,
     "matlab73": _matlab73,
@@ -252,4 +283,6 @@ WRITERS: Mapping[str, Callable[[Path], list[Path]]] = {
     "rosbag": _rosbag("SQLITE3", ".db3"),
     "json": _texts("log.json", _JSON, _RECORDS, _DATED_RECORDS),
     "numpy": _numpy,
+    "spreadsheet": _spreadsheet,
+    "matlab_objects": _matlab_objects,
 }

@@ -181,7 +181,28 @@ _NPZ_CHANNELS = {
 _SECONDS = {"column": "t", "unit": "s"}
 _OWN = {"angle": {"column": "angle"}, "current": {"column": "current"}}
 
+
+def _spreadsheet(folder: Path) -> Path:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    facts = {"encoder": (fast(), "angle", "deg", angle()), "drive": (slow(), "current", "mA", current())}
+    for name, (time, channel, unit, values) in facts.items():
+        sheet = book.create_sheet(name)
+        for row in (["bench", "A 7"], ["rate", 200, "Hz"], ["t", channel, "note"], ["s", unit, ""]):
+            sheet.append(row)
+        for at, value in zip(time.tolist(), values.tolist(), strict=True):
+            sheet.append([at, value, None])
+    book.save(folder / "run.xlsx")
+    return folder / "run.xlsx"
+
+
+_SHEETS = {
+    "angle": {"column": "encoder.angle", "time": {"column": "encoder.t"}},
+    "current": {"column": "drive.current", "time": {"column": "drive.t"}},
+}
 CASES = {
+    "spreadsheet": ForeignCase(_spreadsheet, _SHEETS),
     "parquet": ForeignCase(_parquet, {"angle": {"column": "angle"}}, {"column": "stamp"}),
     "parquet counts": ForeignCase(_parquet, {"angle": {"column": "angle"}}, {"column": "count", "unit": "ns"}),
     "matlab 5": ForeignCase(_matlab5, _MATLAB_CHANNELS, _MATLAB_TIME, False),

@@ -476,8 +476,8 @@ def test_a_step_that_is_none_is_told(time: str, told: str, tmp_path: Path) -> No
 
 def test_other_formats_and_missing_files_are_told(tmp_path: Path) -> None:
     """An unknown suffix lists the formats; a missing file or map is told as such."""
-    with pytest.raises(FrictionOcpError, match=r"a.xlsx: no reader for '.xlsx'; available: .csv, .tsv, .txt, .parquet"):
-        import_recording(tmp_path / "a.xlsx", tmp_path / "m.yaml")
+    with pytest.raises(FrictionOcpError, match=r"a.docx: no reader for '.docx'; available: .csv, .tsv, .txt, .parquet"):
+        import_recording(tmp_path / "a.docx", tmp_path / "m.yaml")
     with pytest.raises(FrictionOcpError, match=r"m.yaml: there is no such map"):
         import_recording(tmp_path / "a.csv", tmp_path / "m.yaml")
     with pytest.raises(FrictionOcpError, match=r"a.csv: there is no such file"):

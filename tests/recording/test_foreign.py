@@ -152,6 +152,7 @@ def test_an_axis_that_counts_from_its_own_start_is_left_alone(tmp_path: Path) ->
         ("mdf", "asammdf", "mdf"),
         ("tdms", "nptdms", "tdms"),
         ("ros mcap", "rosbags.highlevel", "ros"),
+        ("spreadsheet", "python_calamine", "spreadsheet"),
     ],
 )
 def test_a_missing_library_is_said_with_its_install_command(
@@ -168,8 +169,8 @@ def test_every_extra_that_is_named_exists() -> None:
     """The install commands name extras of this project; `formats` has all of them."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    assert extras["formats"] == ["friction-ocp[parquet,mdf,ros,tdms,matlab]"]
-    assert all(len(extras[name]) == 1 for name in ("parquet", "mdf", "ros", "tdms", "matlab"))
+    assert extras["formats"] == ["friction-ocp[parquet,mdf,ros,tdms,matlab,spreadsheet]"]
+    assert all(len(extras[name]) == 1 for name in ("parquet", "mdf", "ros", "tdms", "matlab", "spreadsheet"))
 
 
 def refusal(case: ForeignCase, folder: Path, **changes: Any) -> str:
