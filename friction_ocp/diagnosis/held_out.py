@@ -26,6 +26,8 @@ UNTOLD = 1e-8
 """Information added to that of each parameter, as a share of it: a direction that nothing informs stays where it is."""
 BROKEN = 1e6
 """Least cost of a row where the simulation of a recording left out has broken down: an error of 1400 floors."""
+RUN_AWAY = 1e12
+"""Cost of a row from which its simulation has run away, an error of a million floors: beside that nothing would count."""
 SHRINK = 0.01
 """Share of the information of a left-out recording that is kept: where nothing else informs, parameters stay near.
 
@@ -180,6 +182,6 @@ def raw_costs(program: Program, point: Point, prices: FloatArray) -> FloatArray:
 
 
 def told(costs: FloatArray) -> FloatArray:
-    """Return costs with numbers in the place of those behind a breakdown of the simulation: no smaller than any."""
-    known = np.isfinite(costs)
+    """Return costs with numbers in the place of those behind a breakdown of the simulation: no smaller than others."""
+    known = costs < RUN_AWAY
     return np.where(known, costs, max(BROKEN, float(np.max(costs[known], initial=0.0))))
