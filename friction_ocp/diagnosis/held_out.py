@@ -27,7 +27,7 @@ UNTOLD = 1e-8
 BROKEN = 1e6
 """Least cost of a row where the simulation of a recording left out has broken down: an error of 1400 floors."""
 RUN_AWAY = 1e12
-"""Cost of a row from which its simulation has run away, an error of a million floors: beside that nothing would count."""
+"""Cost of a row from which its simulation has run away, an error of a million floors: beside it nothing would count."""
 SHRINK = 0.01
 """Share of the information of a left-out recording that is kept: where nothing else informs, parameters stay near.
 

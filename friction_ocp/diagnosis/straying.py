@@ -24,6 +24,8 @@ LOOKS = (5, 9, 19, 39, 69)
 """Draws of the noise after which it is asked whether a further one may go as far: together at the level."""
 DRAWS = 19
 """Those that are enough where no verdict hangs on it."""
+GAIN = 0.01
+"""Share of what a run errs that a step has to gain where its start is looked for: more does not show in its excess."""
 
 
 def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: float, held_out: bool = True) -> bool:
@@ -46,7 +48,7 @@ def strays_as_far(fitted: FittedModel, errors: FreeErrors, seed: int, level: flo
     drawn = list[float]()
     for _ in range(math.ceil(1.0 / level) - 1):
         items = tuple(_with_noise(model, use, levels, rng) for use in uses)
-        runs = simulate_recordings(model, items, fitted.theta)
+        runs = simulate_recordings(model, items, fitted.theta, relative=GAIN)
         apart = np.concatenate([one.simulated - other.simulated for one, other in zip(runs, plain, strict=True)])
         ratios: FloatArray = np.nanmean(apart**2, axis=0) / model.noise**2
         drawn.append(excess_of(ratios))

@@ -15,8 +15,13 @@ NOTHING, RELATIVE = 1e-3, 1e-9
 
 # derivatives outgrow all numbers where a simulation breaks down; the objective there is infinite
 @np.errstate(over="ignore", invalid="ignore")
-def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible: float = NOTHING) -> Point:
-    """Solve for the node states with the parameters held, until a step gains next to nothing of log-likelihood."""
+def solve_nodes(
+    program: Program, point: Point, iterations: int = 15, negligible: float = NOTHING, relative: float = RELATIVE
+) -> Point:
+    """Solve for the node states with the parameters held, until a step gains next to nothing of log-likelihood.
+
+    That is `negligible`, or as little `relative` to what the objective still is.
+    """
     if program.without_nodes:
         return point
     still, system = np.zeros_like(point.theta), program.linearise(point, by_theta=False)
@@ -25,7 +30,7 @@ def solve_nodes(program: Program, point: Point, iterations: int = 15, negligible
         steps = reduce_system(system, damping).node_steps(still)
         trial = replace(point, nodes=tuple(old + step for old, step in zip(point.nodes, steps, strict=True)))
         after = program.objective(trial)
-        nothing = max(negligible, RELATIVE * objective)
+        nothing = max(negligible, relative * objective)
         if not after < objective:
             if after - objective < nothing:
                 break  # at a kink, or at the end

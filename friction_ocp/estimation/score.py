@@ -11,7 +11,7 @@ from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.estimation.first_nodes import suggested_point
 from friction_ocp.estimation.horizon import fits_free_run, horizon
 from friction_ocp.estimation.model import Model
-from friction_ocp.estimation.nodes import solve_nodes
+from friction_ocp.estimation.nodes import RELATIVE, solve_nodes
 from friction_ocp.estimation.own_numbers import own_numbers, with_numbers
 from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.stages import free_run, relaxed
@@ -57,13 +57,19 @@ class Errors:
 
 
 def simulate_recordings(
-    model: Model, experiments: tuple[Experiment, ...], theta: FloatArray, width: float = 0.0, fitted: bool = True
+    model: Model,
+    experiments: tuple[Experiment, ...],
+    theta: FloatArray,
+    width: float = 0.0,
+    fitted: bool = True,
+    relative: float = RELATIVE,
 ) -> tuple[FreeRun, ...]:
     """Simulate recordings freely with exact friction, over windows where the drive drifts.
 
     Windows of a fitted free run start where they come closest, as far as that is found: from what was measured, or from
     the smoothed state, whichever leads to less. A number that each recording has for itself is fitted to one that took
-    no part in the fit, and to every one where nothing was `fitted`.
+    no part in the fit, and to every one where nothing was `fitted`. Starts are found until a step gains less than is
+    `relative` to what is left.
     """
     if not experiments:
         return ()
@@ -76,10 +82,10 @@ def simulate_recordings(
     if not fits_free_run(model):
         point = _smoothed(model, experiments, program, point)
     elif span is None:
-        point = solve_nodes(program, point)
+        point = solve_nodes(program, point, relative=relative)
     else:
         starts = (point, _smoothed(model, experiments, program, point))
-        point = _better(program, *(solve_nodes(program, start) for start in starts))
+        point = _better(program, *(solve_nodes(program, start, relative=relative) for start in starts))
     runs: list[FreeRun] = []
     for index, item in enumerate(experiments):
         result = program.simulate(index, point, with_states=True)

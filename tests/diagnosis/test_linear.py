@@ -172,7 +172,7 @@ def test_the_score_test_keeps_its_level(fitted: FittedModel) -> None:
 
 
 def test_what_breaks_down_on_recordings_left_out_is_not_free() -> None:
-    """Rows behind a breakdown, or that ran away, cost as much as the worst before it, and no less than a large error."""
+    """Rows that broke down or ran away cost as much as the worst of the others, and no less than a large error."""
     costs = told(np.array([1.0, 3e7, np.nan, np.inf, 1e300]))
     assert list(costs) == [1.0, 3e7, 3e7, 3e7, 3e7]
     assert list(told(np.array([2.0, np.nan]))) == [2.0, 1e6] and list(told(np.array([2.0, 5.0]))) == [2.0, 5.0]

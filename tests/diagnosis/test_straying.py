@@ -57,9 +57,9 @@ def test_noise_is_drawn_as_often_as_the_level_asks(
     fitted = fit_base(prepare(load_problem(path)))
     errors, calls = free_errors(fitted, held_out=True), list[int]()
 
-    def counted(*args: Any) -> Any:
+    def counted(*args: Any, **kwargs: Any) -> Any:
         calls.append(1)
-        return simulate_recordings(*args)
+        return simulate_recordings(*args, **kwargs)
 
     monkeypatch.setattr(straying, "simulate_recordings", counted)
     assert not strays_as_far(fitted, replace(errors, power=times * errors.power), 0, LEVEL)
