@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from friction_ocp.diagnosis.additions import forms_of
 from friction_ocp.diagnosis.allowance import Tell
@@ -38,6 +39,8 @@ from friction_ocp.execution.executor import InProcess
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.statistics.execution import Execution
 
+LOOKED_AT = frozenset({"closed", "_comes_closer", "stray", "lost"})
+"""What a diagnosis finds out about its free runs once it is asked."""
 MOST_PARTS = 4
 """Parts whose stated values may be taken back."""
 
@@ -71,6 +74,15 @@ class Diagnosis:
     """Why candidates whose work failed were left out, a line each."""
     stated: Problem | None = None
     """The problem as it was given, where its inputs are not read as it states or its loop is opened."""
+
+    def changed(self, **changes: Any) -> Diagnosis:
+        """Return it with other probabilities of its rounds, or stated otherwise; what it has looked at does not change.
+
+        How far noise sets free runs apart (`stray`) takes up to a hundred simulations.
+        """
+        other = replace(self, **changes)
+        vars(other).update({name: vars(self)[name] for name in LOOKED_AT & vars(self).keys()})
+        return other
 
     @property
     def by_predictions(self) -> bool:
@@ -215,7 +227,7 @@ def diagnose(
     """
     driven = driven_as_recorded(problem)
     found = _as_read(problem if driven is None else driven, tell, execution)
-    return found if driven is None else replace(found, stated=problem)
+    return found if driven is None else found.changed(stated=problem)
 
 
 def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
@@ -246,7 +258,7 @@ def _as_read(problem: Problem, tell: Tell, execution: Execution) -> Diagnosis:
 def _read_as(read: Problem, stated: Problem, tell: Tell, execution: Execution, taken: float, began: float) -> Diagnosis:
     """Find what a model lacks whose inputs are `read` otherwise than stated, where some effort was `taken` before."""
     search = _searched(read, tell, execution, share=max(1.0 - taken, LEAST_SHARE))
-    return replace(_concluded(read, search, began), stated=stated)
+    return _concluded(read, search, began).changed(stated=stated)
 
 
 def _searched(
@@ -309,7 +321,7 @@ def _in_hindsight(found: Diagnosis) -> Diagnosis:
     closed = min(max(overall, 0.0), 1.0) if math.isfinite(overall) else 0.0
     unasked = found.by_predictions or found.carries_over or found.lost or found.parted_by_torque
     doubt = 0.0 if unasked else 1.0 - closed
-    return replace(found, rounds=tuple(doubted(found.rounds, found.final, found.left_over, doubt)))
+    return found.changed(rounds=tuple(doubted(found.rounds, found.final, found.left_over, doubt)))
 
 
 def _checked(

@@ -15,8 +15,8 @@ import numpy as np
 from friction_ocp.recording.foreign import ForeignFile, Values, reading, refuse_large
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.in_memory import in_memory
-from friction_ocp.recording.matlab_hdf5 import is_hdf5, open_hdf5
-from friction_ocp.recording.matlab_objects import columns_with_objects, has_objects, has_objects_73
+from friction_ocp.recording.matlab_hdf5 import has_objects_73, is_hdf5, open_hdf5
+from friction_ocp.recording.matlab_objects import columns_with_objects, has_objects
 from friction_ocp.recording.matrix_columns import matrix_columns
 
 KIND = "a MATLAB file"

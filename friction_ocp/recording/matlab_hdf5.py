@@ -13,7 +13,7 @@ import numpy as np
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.attribute_text import attribute_text
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, no_clock, opened, reading
+from friction_ocp.recording.foreign import ForeignFile, Signal, Values, no_clock, opened, reading, refuse_large
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 
@@ -43,6 +43,31 @@ class _Series:
 def is_hdf5(path: Path) -> bool:
     """Whether a file is HDF5, as MATLAB writes since version 7.3."""
     return bool(h5py.is_hdf5(path))
+
+
+def has_objects_73(path: Path) -> bool:
+    """Whether a file of version 7.3 holds objects, and no link by which they could lie in another file.
+
+    Raises FrictionOcpError where one has such a link, or more data than fit into the memory.
+    """
+    with h5py.File(path, "r") as file:
+        if "#subsystem#" not in file:
+            return False
+        faults, sizes = list[str](), list[int]()
+
+        def look(name: str, link: Any) -> None:
+            node = file[name] if isinstance(link, h5py.HardLink) else None
+            if node is None or (isinstance(node, h5py.Dataset) and (node.is_virtual or node.external)):
+                faults.append(name)
+            elif isinstance(node, h5py.Dataset):
+                sizes.append(int(node.nbytes))
+
+        file.visititems_links(look)
+    if faults:
+        what = f"'{faults[0]}' keeps its data elsewhere"
+        raise FrictionOcpError(Finding(str(path), what, "data inside the file", "copy it there"))
+    refuse_large(path, sum(sizes), "variables")
+    return True
 
 
 @contextmanager

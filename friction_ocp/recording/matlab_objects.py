@@ -7,15 +7,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-import h5py as _h5py  # pyright: ignore[reportMissingTypeStubs]
 import numpy as np
 
-from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.errors import FrictionOcpError
 from friction_ocp.optional_library import optional_library
-from friction_ocp.recording.foreign import Values, refuse_large
+from friction_ocp.recording.foreign import Values
 from friction_ocp.recording.matrix_columns import matrix_columns
-
-h5py: Any = _h5py  # its own types are incomplete
 
 MAX_DEPTH = 20
 _OFFSET, _NOWHERE = slice(116, 124), (b"\0" * 8, b" " * 8)
@@ -28,31 +25,6 @@ def has_objects(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(128)
     return len(head) == 128 and head[_OFFSET] not in _NOWHERE
-
-
-def has_objects_73(path: Path) -> bool:
-    """Whether a file of version 7.3 holds objects, and no link by which they could lie in another file.
-
-    Raises FrictionOcpError where one has such a link, or more data than fit into the memory.
-    """
-    with h5py.File(path, "r") as file:
-        if "#subsystem#" not in file:
-            return False
-        faults, sizes = list[str](), list[int]()
-
-        def look(name: str, link: Any) -> None:
-            node = file[name] if isinstance(link, h5py.HardLink) else None
-            if node is None or (isinstance(node, h5py.Dataset) and (node.is_virtual or node.external)):
-                faults.append(name)
-            elif isinstance(node, h5py.Dataset):
-                sizes.append(int(node.nbytes))
-
-        file.visititems_links(look)
-    if faults:
-        what = f"'{faults[0]}' keeps its data elsewhere"
-        raise FrictionOcpError(Finding(str(path), what, "data inside the file", "copy it there"))
-    refuse_large(path, sum(sizes), "variables")
-    return True
 
 
 def columns_with_objects(path: Path) -> tuple[list[tuple[str, Values, str]], str]:

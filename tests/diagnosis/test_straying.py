@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from diagnosis_cases import axis, diagnosed, with_stribeck, write_case
 
 from friction_ocp.diagnosis import straying
 from friction_ocp.diagnosis.base_fit import fit_base
+from friction_ocp.diagnosis.diagnose import Diagnosis
 from friction_ocp.diagnosis.free_gap import free_errors
 from friction_ocp.diagnosis.straying import strays_as_far
 from friction_ocp.estimation.model import prepare
@@ -64,6 +65,15 @@ def test_noise_is_drawn_as_often_as_the_level_asks(
     monkeypatch.setattr(straying, "simulate_recordings", counted)
     assert not strays_as_far(fitted, replace(errors, power=times * errors.power), 0, LEVEL)
     assert fewest <= len(calls) <= most
+
+
+def test_runs_are_drawn_once_for_a_diagnosis() -> None:
+    """What free runs told is kept where the rounds are seen in hindsight, or the problem is stated otherwise."""
+    nothing: dict[str, Any] = {item.name: None for item in fields(Diagnosis)}
+    found = Diagnosis(**nothing)
+    vars(found)["stray"] = True  # as it is once it has been asked for, which takes a base fit here
+    later = found.changed(rounds=()).changed(stated=None)
+    assert later.stray and later.rounds == ()
 
 
 @pytest.mark.slow
