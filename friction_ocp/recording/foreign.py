@@ -87,9 +87,13 @@ def reading(path: Path, kind: str) -> Generator[None]:
 
 def damaged(path: Path, kind: str, error: Exception) -> FrictionOcpError:
     """Return the finding about a file that its library cannot read."""
-    reason = " ".join(str(error).split())[:200] or type(error).__name__
-    what = f"this cannot be read as {kind} ({reason})"
+    what = f"this cannot be read as {kind} ({reason_of(error)})"
     return FrictionOcpError(Finding(str(path), what, remedy="the file may be damaged; copy it again"))
+
+
+def reason_of(error: Exception) -> str:
+    """Return what a library says of its error, on one line; the kind of it where it says nothing."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
 
 
 @contextmanager

@@ -57,7 +57,7 @@ def has_objects_73(path: Path) -> bool:
 
         def look(name: str, link: Any) -> None:
             node = file[name] if isinstance(link, h5py.HardLink) else None
-            if node is None or (isinstance(node, h5py.Dataset) and (node.is_virtual or node.external)):
+            if node is None or (isinstance(node, h5py.Dataset) and _is_elsewhere(node)):
                 faults.append(name)
             elif isinstance(node, h5py.Dataset):
                 sizes.append(int(node.nbytes))
@@ -159,12 +159,17 @@ def _text(node: Any) -> str:
 
 def _is_short(node: Any) -> bool:
     """Whether a dataset is inside the file, not null, and short enough to be read while the file is listed."""
-    return node.shape is not None and node.size <= MAX_ELEMENTS and not node.is_virtual and not node.external
+    return node.shape is not None and node.size <= MAX_ELEMENTS and not _is_elsewhere(node)
+
+
+def _is_elsewhere(node: Any) -> bool:
+    """Whether a dataset keeps its data in other files, or has them from other datasets."""
+    return bool(node.is_virtual or node.external)
 
 
 def _values(file: Any, series: _Series, path: Path) -> Values:
     node = file[series.path]
-    if node.is_virtual or node.external:
+    if _is_elsewhere(node):
         what = f"'{series.signal.name}' keeps its data in other files"
         raise FrictionOcpError(Finding(str(path), what, "data inside the file", "copy it there"))
     return np.atleast_1d(np.asarray(node[series.where] if series.where else node[()]))

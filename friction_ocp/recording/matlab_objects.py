@@ -11,7 +11,7 @@ import numpy as np
 
 from friction_ocp.errors import FrictionOcpError
 from friction_ocp.optional_library import optional_library
-from friction_ocp.recording.foreign import Values
+from friction_ocp.recording.foreign import Values, reason_of
 from friction_ocp.recording.matrix_columns import matrix_columns
 
 MAX_DEPTH = 20
@@ -46,8 +46,7 @@ def columns_with_objects(path: Path) -> tuple[list[tuple[str, Values, str]], str
     except FrictionOcpError as error:
         return [], "; " + "; ".join(f"{finding.what}: {finding.remedy}" for finding in error.findings)
     except Exception as error:  # what its reader makes of objects that it does not know is not to be foreseen
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        return [], f"; tables and other objects in it cannot be read ({reason})"
+        return [], f"; tables and other objects in it cannot be read ({reason_of(error)})"
 
 
 def _columns(name: str, value: Any, depth: int) -> Iterator[tuple[str, Values, str]]:

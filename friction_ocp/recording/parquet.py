@@ -22,11 +22,9 @@ from friction_ocp.recording.foreign import (
 )
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
-from friction_ocp.recording.stamps import Writing, first_instant, past_midnight, stamped
+from friction_ocp.recording.stamps import LOOKED_AT, Writing, first_instant, stamped
 
 KIND = "a Parquet file"
-_LOOKED_AT = 200
-"""Texts at the beginning of a column that tell whether it holds dates."""
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
 
 
@@ -87,8 +85,7 @@ class _Reader:
     def column(self, field: Any, origin: int) -> Values:
         if field.name in self.stamps:
             writing, cells = self.stamps[field.name]
-            seconds = writing.seconds_of(cells, origin)[0]
-            return seconds if writing.dated else past_midnight(seconds)
+            return writing.times_of(cells, origin)
         column = self.file.read(columns=[field.name]).column(0).combine_chunks()
         missing = np.asarray(column.is_null())
         if self._is_date(field.type) or self._is_span(field.type):
@@ -103,7 +100,7 @@ class _Reader:
         is_text = self.types.is_string(field.type) or self.types.is_large_string(field.type)
         if not is_text or self.file.metadata.num_rows > MAX_SAMPLES:  # which is refused
             return False
-        first = next(self.file.iter_batches(batch_size=_LOOKED_AT, columns=[field.name]), None)
+        first = next(self.file.iter_batches(batch_size=LOOKED_AT, columns=[field.name]), None)
         return first is not None and stamped(_as_texts(first.column(0))) is not None
 
     def _cells(self, name: str) -> list[str]:

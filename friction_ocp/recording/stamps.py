@@ -32,7 +32,7 @@ _SWAPPABLE = re.compile(rf"\s*\d{{1,2}}[-/]\d{{1,2}}[-/]{_YEAR}", re.ASCII)
 """Dates in which some write the day first, and others the month."""
 _SECOND, _DAY = 10**9, 86_400
 _EPOCH = date(1970, 1, 1).toordinal()
-_LOOKED_AT = 200
+LOOKED_AT = 200
 """Cells at the beginning of a column that tell how it is written, beside its last one."""
 
 
@@ -50,6 +50,10 @@ class Writing:
         known = _nanoseconds(cell, self.day_first)
         return None if known is None else known[0]
 
+    def first_of(self, cells: Sequence[str]) -> int | None:
+        """Return the first instant of a column, as `nanoseconds` does; None where it has none."""
+        return next((known for cell in cells if (known := self.nanoseconds(cell)) is not None), None)
+
     def seconds_of(self, cells: Sequence[str], origin: int) -> tuple[FloatArray, list[int]]:
         """Return (n,) s since `origin`, ns since 1970, times of day as s since midnight, and the rows that are neither.
 
@@ -65,6 +69,11 @@ class Writing:
                 bad.append(row)
         return values, bad
 
+    def times_of(self, cells: Sequence[str], origin: int) -> FloatArray:
+        """Return (n,) s of a whole column, times of day going on to grow where a day ends."""
+        seconds = self.seconds_of(cells, origin)[0]
+        return seconds if self.dated else past_midnight(seconds)
+
 
 def is_stamp(text: str) -> bool:
     """Whether a text is a date with a time of day, or a time of day."""
@@ -77,7 +86,7 @@ def writing_of(cells: Sequence[str]) -> Writing:
     Where the day may stand before or after the month, that holds by which most dates exist, then by which they are
     nearest to one another, then the month first.
     """
-    stamps = [cell for cell in (*cells[:_LOOKED_AT], *cells[-1:]) if is_stamp(cell)]
+    stamps = [cell for cell in (*cells[:LOOKED_AT], *cells[-1:]) if is_stamp(cell)]
     swappable = [cell for cell in stamps if _SWAPPABLE.match(cell)]
     if not swappable:
         known = _nanoseconds(stamps[0], day_first=False) if stamps else None
@@ -92,11 +101,8 @@ def writing_of(cells: Sequence[str]) -> Writing:
 
 def first_instant(columns: Sequence[tuple[Writing, Sequence[str]]]) -> int:
     """Return the earliest of the first instants of columns of dates, ns since 1970; 0 where no column has dates."""
-    dated = [(writing, cells) for writing, cells in columns if writing.dated]
-    instants = [
-        [known for cell in cells if (known := writing.nanoseconds(cell)) is not None] for writing, cells in dated
-    ]
-    return min((known[0] for known in instants if known), default=0)
+    firsts = [writing.first_of(cells) for writing, cells in columns if writing.dated]
+    return min((first for first in firsts if first is not None), default=0)
 
 
 def past_midnight(seconds: FloatArray) -> FloatArray:
@@ -120,8 +126,7 @@ def as_seconds(columns: Mapping[str, Values]) -> tuple[dict[str, Values], frozen
     ]
     first += [earliest] if (earliest := first_instant([(writings[name], texts[name]) for name in writings])) else []
     origin = min(first, default=0)
-    found: dict[str, Values] = {name: known.seconds_of(texts[name], origin)[0] for name, known in writings.items()}
-    found |= {name: past_midnight(found[name]) for name, known in writings.items() if not known.dated}
+    found: dict[str, Values] = {name: known.times_of(texts[name], origin) for name, known in writings.items()}
     for known, since in ((dates, origin), (spans, 0)):
         found |= {
             name: np.where(np.isnat(values), np.nan, seconds_since(values.astype(np.int64), since))
@@ -132,7 +137,7 @@ def as_seconds(columns: Mapping[str, Values]) -> tuple[dict[str, Values], frozen
 
 def stamped(cells: Sequence[str]) -> Writing | None:
     """Return how a column writes its stamps; None where a cell is neither one nor missing, or all are missing."""
-    if not any(map(is_stamp, cells[:_LOOKED_AT])):
+    if not any(map(is_stamp, cells[:LOOKED_AT])):
         return None
     writing = writing_of(cells)
     neither = (cell for cell in cells if writing.nanoseconds(cell) is None and not is_missing(cell))
