@@ -1,8 +1,8 @@
 """Files are read in a child process first: damage that hangs or kills a library of others takes the child alone.
 
-The child is a fork, limited in processor time and memory. What it reads is thrown away; where it refuses a file that is
-the answer, for a library that has read damage once may not survive it twice. Where there is no fork (Windows) files are
-read without it.
+The child is a fork, limited in processor time and memory. What it reads is thrown away, with the temporary files that
+libraries leave behind when they fail; where it refuses a file that is the answer, for a library that read damage once
+may not survive it twice. Where there is no fork (Windows) files are read without it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import os
 import signal
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -40,7 +41,8 @@ def probed(
     def guarded(path: str | Path, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         known = _identity(read, Path(path))
         if hasattr(os, "fork") and not _probing and (known is None or known not in _survived):
-            _probe(Path(path), lambda: read(path, *args, **kwargs))
+            with tempfile.TemporaryDirectory() as scratch:
+                _probe(Path(path), lambda: read(path, *args, **kwargs), scratch)
             if known is not None:
                 _survived.add(known)
         return read(path, *args, **kwargs)
@@ -70,8 +72,8 @@ def _size(path: Path) -> int:
     return path.stat().st_size if path.is_file() else 0
 
 
-def _probe(path: Path, read: Callable[[], object]) -> None:
-    """Read in a child; raises FrictionOcpError if it did not come back."""
+def _probe(path: Path, read: Callable[[], object], scratch: str) -> None:
+    """Read in a child whose temporary files go to `scratch`; raises FrictionOcpError if it did not come back."""
     seconds = SECONDS + _size(path) // BYTES_PER_SECOND
     receiving, sending = os.pipe()
     with warnings.catch_warnings():
@@ -79,6 +81,7 @@ def _probe(path: Path, read: Callable[[], object]) -> None:
         child = os.fork()
     if child == 0:
         os.close(receiving)
+        tempfile.tempdir = scratch
         _read_and_leave(read, seconds, sending)
     os.close(sending)
     try:

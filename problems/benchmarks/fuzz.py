@@ -94,7 +94,8 @@ def fuzz(reader: str, inputs: int, seed: int, keep: Path) -> Tally:
     with tempfile.TemporaryDirectory() as place:
         sandbox = Path(place)
         sources = sound_files(reader, sandbox / "sound")
-        (sandbox / "work").mkdir()
+        for name in ("work", "temporary"):
+            (sandbox / name).mkdir()
         before = _listing(sandbox)
         while tally.inputs < inputs:
             _shift(tally, sources, sandbox, seed, inputs, keep)
@@ -105,7 +106,10 @@ def fuzz(reader: str, inputs: int, seed: int, keep: Path) -> Tally:
 
 
 def _listing(sandbox: Path) -> set[str]:
-    """Return all files of the sandbox but those of the folder that readers may use, and of the working folder."""
+    """Return all files of the sandbox but those of the folder that readers may use, and of the working folder.
+
+    Temporary files are among them: what a reader leaves there stays.
+    """
     inside = {str(path) for path in sandbox.rglob("*") if "work" not in path.relative_to(sandbox).parts[:1]}
     return inside | {str(path) for path in Path.cwd().iterdir()}
 
@@ -155,7 +159,7 @@ def _work(pipe: Any, reader: str, sources: Sequence[bytes], sandbox: Path, seed:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.chdir(sandbox / "work")
-    tempfile.tempdir = str(sandbox / "work")
+    tempfile.tempdir = str(sandbox / "temporary")
     read = READERS[reader]
     faulthandler.disable()
     logging.disable()

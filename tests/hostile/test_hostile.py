@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import asammdf  # noqa: F401  (loaded here, so that it takes none of the time that a file has)
@@ -30,11 +31,13 @@ def test_there_are_many() -> None:
 def test_a_hostile_file_is_refused(
     tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The command ends as wrong input does, says why, and leaves the folders as they were."""
+    """The command ends as wrong input does, says why, and leaves the folders as they were, also of temporary files."""
     make, message = HOSTILE[name]
     folder = tmp_path / "inside" / "work"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     if "has no end" in message:  # what ends may take as long as it is given, on a slow machine
         monkeypatch.setattr(probe, "SECONDS", 2)
     arguments = make(folder)

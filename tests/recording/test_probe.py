@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,19 @@ def test_a_sound_file_is_read_here(tmp_path: Path) -> None:
         return os.getpid()
 
     assert read(tmp_path) == os.getpid()
+
+
+def test_temporary_files_of_a_failing_library_are_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed in the midst of one, or having left a copy of the file behind."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "scratch"))
+    (tmp_path / "scratch").mkdir()
+
+    @probed
+    def read(path: str | Path) -> None:
+        file, _ = tempfile.mkstemp()
+        os.write(file, b"half of it")
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    with pytest.raises(FrictionOcpError):
+        read(tmp_path)
+    assert not list((tmp_path / "scratch").iterdir())
