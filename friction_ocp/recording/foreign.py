@@ -69,9 +69,19 @@ def no_clock(name: str) -> FloatArray:
     raise KeyError(name)
 
 
-def library(module: str, package: str, extra: str, path: Path) -> Any:
-    """Import the library that reads a format; raises FrictionOcpError with the install command where it is missing."""
-    return optional_library(module, package, extra, str(path), f"reading {path.suffix or 'this folder'}")
+@dataclass(frozen=True)
+class Library:
+    """A library of others that reads a format."""
+
+    module: str
+    package: str
+    extra: str
+    """Of this package, that installs it."""
+
+    def load(self, path: Path) -> Any:
+        """Import it to read a file; raises FrictionOcpError with the install command where it is missing."""
+        purpose = f"reading {path.suffix or 'this folder'}"
+        return optional_library(self.module, self.package, self.extra, str(path), purpose)
 
 
 @contextmanager

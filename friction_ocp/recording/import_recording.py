@@ -1,17 +1,20 @@
 """Import of foreign formats: which reader takes which file.
 
-Delimited text is read here alone; what libraries of others read is read in a child process first.
+Delimited text is read here alone; what libraries of others read is read in a child process first. These are loaded
+before that, once for the child and for here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar
 
 from friction_ocp.errors import Finding, FrictionOcpError
+from friction_ocp.recording import mdf, parquet, rosbag, spreadsheet, tdms
 from friction_ocp.recording.csv import open_csv
 from friction_ocp.recording.csv_layout import UTF16_MARKS
-from friction_ocp.recording.foreign import ForeignFile, Opener
+from friction_ocp.recording.foreign import ForeignFile, Library, Opener
 from friction_ocp.recording.import_map import load_import_map
 from friction_ocp.recording.json_log import open_json
 from friction_ocp.recording.listing import describe
@@ -57,6 +60,16 @@ READERS: Mapping[str, Opener] = {
     ".ods": open_spreadsheet,
 }
 """Reader by the suffix of the file; a further format is a further line."""
+LIBRARIES: Mapping[Opener, Library] = {
+    open_parquet: parquet.LIBRARY,
+    open_mdf: mdf.LIBRARY,
+    open_rosbag: rosbag.LIBRARY,
+    open_tdms: tdms.LIBRARY,
+    open_spreadsheet: spreadsheet.LIBRARY,
+}
+"""What a reader cannot do without."""
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 _HEAD = 4096
 _OF_BYTES = b"\0"
 """What is in the first bytes of every measurement file, whose sizes are numbers of fixed length, and in no text."""
@@ -72,8 +85,7 @@ def import_recording(path: str | Path, map_path: str | Path) -> Recording:
 
 def import_file(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
     """Read a foreign file by a map: static points where the map has `points`, else a recording."""
-    read = _import if _opener(Path(path)) is open_csv else probed(_import)
-    return read(path, map_path)
+    return _guarded(_import, path)(path, map_path)
 
 
 def _import(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
@@ -87,8 +99,7 @@ def _import(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
 
 def inspect_file(path: str | Path) -> str:
     """Return what a foreign file holds, one line a signal with its unit, rate, length and range."""
-    read = _inspect if _opener(Path(path)) is open_csv else probed(_inspect)
-    return read(path)
+    return _guarded(_inspect, path)(path)
 
 
 def _inspect(path: str | Path) -> str:
@@ -98,6 +109,18 @@ def _inspect(path: str | Path) -> str:
     with opener(path, None) as file:
         _refuse_nothing(file, path)
         return describe(file, path)
+
+
+def _guarded(
+    read: Callable[Concatenate[str | Path, Arguments], Result], path: str | Path
+) -> Callable[Concatenate[str | Path, Arguments], Result]:
+    """Return a reader that survives what a file does to the library that reads it, that library being loaded."""
+    opener = _opener(Path(path))
+    if opener is open_csv:
+        return read
+    if opener in LIBRARIES and Path(path).exists():
+        LIBRARIES[opener].load(Path(path))
+    return probed(read)
 
 
 def _opener(path: Path) -> Opener:

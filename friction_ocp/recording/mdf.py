@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, library, opened, reading
+from friction_ocp.recording.foreign import ForeignFile, Library, Signal, Values, opened, reading
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
 KIND = "an MDF file"
+LIBRARY = Library("asammdf", "asammdf", "mdf")
 
 
 @contextmanager
 def open_mdf(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
     """List the channels of an MDF file; a name that several groups have is followed by its group."""
-    asammdf: Any = library("asammdf", "asammdf", "mdf", path)
+    asammdf: Any = LIBRARY.load(path)
     with opened(path, KIND, lambda: asammdf.MDF(path)) as file:
         with reading(path, KIND):
             places = [

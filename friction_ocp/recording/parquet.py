@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +13,10 @@ import numpy as np
 from friction_ocp.recording.foreign import (
     MAX_SAMPLES,
     ForeignFile,
+    Library,
     Signal,
     Values,
     instant,
-    library,
     no_clock,
     opened,
     reading,
@@ -25,14 +26,15 @@ from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.stamps import LOOKED_AT, Writing, first_instant, stamped
 
 KIND = "a Parquet file"
+LIBRARY = Library("pyarrow.parquet", "pyarrow", "parquet")
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
 
 
 @contextmanager
 def open_parquet(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
     """List the columns of a Parquet file; columns of dates become s since the earliest of their first rows."""
-    pyarrow: Any = library("pyarrow", "pyarrow", "parquet", path)
-    parquet: Any = library("pyarrow.parquet", "pyarrow", "parquet", path)
+    parquet: Any = LIBRARY.load(path)
+    pyarrow: Any = importlib.import_module("pyarrow")
     with opened(path, KIND, lambda: parquet.ParquetFile(path)) as file:
         reader = _Reader(pyarrow, file, path)
         fields = list(file.schema_arrow)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,11 +15,11 @@ from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.foreign import (
     MAX_SAMPLES,
     ForeignFile,
+    Library,
     Signal,
     Values,
     free_memory,
     instant,
-    library,
     opened,
     seconds_since,
 )
@@ -26,6 +27,7 @@ from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
 KIND = "a ROS bag"
+LIBRARY = Library("rosbags.highlevel", "rosbags", "ros")
 MAX_FIELDS = 200
 """Numbers of one message that are listed; images and point clouds have more and are left out."""
 RECEIVED, STAMP = "received", "header.stamp"
@@ -65,8 +67,8 @@ class _Topic:
 @contextmanager
 def open_rosbag(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
     """List the numbers of all topics as `/topic.field`; elements of arrays as `/topic.field[0]`, or by their `name`."""
-    highlevel: Any = library("rosbags.highlevel", "rosbags", "ros", path)
-    typesys: Any = library("rosbags.typesys", "rosbags", "ros", path)
+    highlevel: Any = LIBRARY.load(path)
+    typesys: Any = importlib.import_module("rosbags.typesys")
     known = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     with opened(path, KIND, lambda: highlevel.AnyReader([path], default_typestore=known)) as bag:
         _refuse_too_many(path, int(bag.message_count))

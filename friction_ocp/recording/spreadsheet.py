@@ -15,12 +15,13 @@ import numpy as np
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording.csv_cells import is_missing, is_number, no_number, numbers
 from friction_ocp.recording.csv_layout import header_of, rows_of_numbers
-from friction_ocp.recording.foreign import ForeignFile, Values, library, opened
+from friction_ocp.recording.foreign import ForeignFile, Library, Values, opened
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.in_memory import in_memory
 from friction_ocp.recording.stamps import is_stamp
 
 KIND = "a spreadsheet"
+LIBRARY = Library("python_calamine", "python-calamine", "spreadsheet")
 _SNIFFED_ROWS = 200
 _TOLD = 10
 """Faults of one file that are told."""
@@ -40,7 +41,7 @@ class _Column:
 @contextmanager
 def open_spreadsheet(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
     """List the columns of the tables in all sheets; they are called `sheet.column` where several sheets have tables."""
-    calamine: Any = library("python_calamine", "python-calamine", "spreadsheet", path)
+    calamine: Any = LIBRARY.load(path)
     tables: dict[str, list[_Column]] = {}
     with opened(path, KIND, lambda: calamine.CalamineWorkbook.from_path(str(path))) as book:
         for name in book.sheet_names:

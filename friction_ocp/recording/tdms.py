@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from friction_ocp.recording.foreign import ForeignFile, Signal, Values, instant, library, opened, reading, seconds_since
+from friction_ocp.recording.foreign import ForeignFile, Library, Signal, Values, instant, opened, reading, seconds_since
 from friction_ocp.recording.header_unit import header_unit
 from friction_ocp.recording.import_map import ImportMap
 from friction_ocp.recording.recording import FloatArray
 
 KIND = "a TDMS file"
+LIBRARY = Library("nptdms", "npTDMS", "tdms")
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 
 
 @contextmanager
 def open_tdms(path: Path, import_map: ImportMap | None = None) -> Generator[ForeignFile]:
     """List the channels of a TDMS file as `group/channel`; waveforms have time axes, columns of dates become s."""
-    nptdms: Any = library("nptdms", "npTDMS", "tdms", path)
+    nptdms: Any = LIBRARY.load(path)
     with opened(path, KIND, lambda: nptdms.TdmsFile.open(path)) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
         starts = [_start(channel) for channel in channels]

@@ -148,7 +148,7 @@ def test_an_axis_that_counts_from_its_own_start_is_left_alone(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("name", "module", "extra"),
     [
-        ("parquet", "pyarrow", "parquet"),
+        ("parquet", "pyarrow.parquet", "parquet"),
         ("mdf", "asammdf", "mdf"),
         ("tdms", "nptdms", "tdms"),
         ("ros mcap", "rosbags.highlevel", "ros"),
