@@ -13,8 +13,8 @@ from friction_ocp.estimation.program import Point, Program
 from friction_ocp.estimation.static_points import StaticTerm
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
 
-Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray, FloatArray]
-"""Jacobian, residuals, their scores and curvatures, whether they go by the loss, times."""
+Columns = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]
+"""Jacobian, residuals, their scores and curvatures, channels, times."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Influence:
     """(rows,) rho'(r)."""
     curvature: FloatArray
     """(rows,) the weight of each row in the information matrix."""
-    by_loss: BoolArray
-    """(rows,) whether the loss of the estimation goes by it; gaps, noise of inputs and static points are squares."""
+    channel: IntArray
+    """(rows,) output column of a measured sample; -1 for gaps, noise of inputs and static points."""
     recording: IntArray
     """(rows,) index of the recording; static points count on behind the recordings."""
     window: IntArray
@@ -39,6 +39,11 @@ class Influence:
     """(rows,) s; the index of a static point."""
     prior: FloatArray
     """(parameters, parameters) information from priors."""
+
+    @property
+    def by_loss(self) -> BoolArray:
+        """(rows,) whether the loss of the estimation goes by it, as by samples; all else is squares."""
+        return self.channel >= 0
 
     @property
     def information(self) -> FloatArray:
@@ -55,17 +60,17 @@ def influence(program: Program, point: Point) -> Influence:
     ]
     parts += [_of_points(term, program.space, point.theta) for term in program.static]
     joined = (np.concatenate(column) for column in zip(*parts, strict=True))
-    jacobian, residual, weight, curvature, by_loss, time = joined
+    jacobian, residual, weight, curvature, channel, time = joined
     windows = [_windows(program, index, part[5]) for index, part in enumerate(parts)]
     recording = np.concatenate([np.full(part[1].size, index) for index, part in enumerate(parts)])
     pull = np.where(np.isfinite(program.space.prior_std), program.space.prior_std, np.inf) ** -2.0
     window = np.concatenate(windows)
-    return Influence(jacobian, residual, weight, curvature, by_loss, recording, window, time, np.diag(pull))
+    return Influence(jacobian, residual, weight, curvature, channel, recording, window, time, np.diag(pull))
 
 
 def _squares(jacobian: FloatArray, errors: FloatArray, time: FloatArray) -> Columns:
     """Return rows whose cost is half their square."""
-    return jacobian, errors, errors, np.ones(errors.size), np.zeros(errors.size, dtype=bool), time
+    return jacobian, errors, errors, np.ones(errors.size), np.full(errors.size, -1), time
 
 
 def _of_noise(program: Program, point: Point, index: int, nodes: FloatArray) -> Columns:
@@ -108,7 +113,7 @@ def _of_recording(program: Program, point: Point, index: int, by_theta: FloatArr
     time = np.broadcast_to(item.grid.time[:, None], errors.shape)[seen]
     loss = program.loss
     score = loss.weight(residual) * residual
-    parts = [(rows, residual, score, loss.curvature(residual), np.ones(residual.size, dtype=bool), time)]
+    parts = [(rows, residual, score, loss.curvature(residual), np.nonzero(seen)[1], time)]
     if cut.gap_weight is not None and cut.count > 1:
         flat = program.gap_errors(index, point, result.end).ravel()
         moved = np.einsum("kij,kjp->kip", result.dend[:-1, :, :states], nodes[:-1]) - nodes[1:]

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
 from friction_ocp.estimation.influence import Influence
+from friction_ocp.estimation.origins import pull
 from friction_ocp.estimation.parameter_space import ParameterSpace
 from friction_ocp.estimation.problem import Loss
 from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
@@ -25,6 +26,11 @@ SMALLEST_INFORMATION, UNTOLD = 1e-14, 1e-12
 MIN_BLOCKS, MAX_BLOCKS = 3, 200
 """Blocks of residuals that the robust covariance is summed over: as many as are long enough to be independent. Where
 these are few, the t distribution says how little a variance from them is known."""
+LENGTHS = 4.0
+"""Correlation lengths of a block."""
+OF_A_WALK, FOR_A_PARAMETER = 2.9, 0.8
+"""Blocks that residuals hold which are a random walk, at most in 95 % of cases, and how many more each fitted parameter
+makes of them: with fewer they may be one. Walks of 500 and of 4000 rows show as many (`test_origins.py`)."""
 MOST_LEVERAGE = 0.9
 """Share of what is known about a direction that leaving out a block may take: without a block that alone tells of it
 nothing is known."""
@@ -82,7 +88,7 @@ def uncertainty(space: ParameterSpace, theta: FloatArray, found: Influence, sure
     otherwise, and for losses that need not be the likelihood of the noise, what leaving out one block of neighbouring
     residuals after the other makes of it: the sandwich H^-1 B H^-1 with each block's share of the information taken out
     (Huber 1967; Bell & McCaffrey 2002, the jackknife). Without that few blocks with much to tell make intervals too
-    short.
+    short. Errors that go on to the end of a free run belong to the block in which they arise.
     """
     weight = _density_weight(found) if loss == "absolute" else found.curvature
     information = found.jacobian.T @ (weight[:, None] * found.jacobian) + found.prior
@@ -134,11 +140,12 @@ def _jackknifed(
     `information` is that on the free parameters, `told` its inverse.
     """
     moved: list[FloatArray] = []
-    for rows in _blocks(found):
-        slope = found.jacobian[np.ix_(rows, np.flatnonzero(free))]
-        part = slope.T @ (weight[rows, None] * slope)
+    length, own = _correlation_rows(found), np.ix_(free, free)
+    pulls = pull(found, weight, _wandering(found, length, int(np.sum(free))))
+    for rows in _blocks(found, length):
+        part = pulls.information(rows)[own]
         left, _ = inverse_information(information - _leverage_limit(told, part) * part)
-        moved.append(left @ (slope.T @ found.score_weight[rows]))
+        moved.append(left @ (pulls.reach[rows].T @ pulls.error[rows])[free])
     return np.array(moved)
 
 
@@ -148,7 +155,22 @@ def _leverage_limit(told: FloatArray, part: FloatArray) -> float:
     return min(1.0, MOST_LEVERAGE / max(leverage, 1e-300))
 
 
-def _blocks(found: Influence) -> list[IntArray]:
+def _wandering(found: Influence, length: float, parameters: int) -> BoolArray:
+    """Return (rows,) which belong to a free run whose errors may go on to its end, as those of a random walk do.
+
+    Where a recording has several free runs they end with each.
+    """
+    wander, recordings = np.zeros(found.residual.size, dtype=bool), np.unique(found.recording)
+    most = OF_A_WALK + FOR_A_PARAMETER * parameters / recordings.size
+    for index in recordings:
+        rows = np.flatnonzero(found.recording == index)
+        alone = bool(np.all(found.by_loss[rows]) and np.all(found.window[rows] == found.window[rows[0]]))
+        lasting = _tells_of_the_next(found.score_weight[rows])
+        wander[rows] = alone and lasting and rows.size < most * LENGTHS * length
+    return wander
+
+
+def _blocks(found: Influence, length: float) -> list[IntArray]:
     """Return the rows of blocks of neighbouring residuals: several correlation lengths, or whole free runs.
 
     The errors of a free run go on to its end, and into none that starts afresh. A few residuals of which none tells of
@@ -156,10 +178,10 @@ def _blocks(found: Influence) -> list[IntArray]:
     """
     places = [np.flatnonzero(found.recording == index) for index in np.unique(found.recording)]
     runs: list[list[IntArray]] = [np.split(rows, np.flatnonzero(np.diff(found.window[rows])) + 1) for rows in places]
-    length, apart = _correlation_rows(found), sum(map(len, runs)) >= MIN_BLOCKS
+    apart = sum(map(len, runs)) >= MIN_BLOCKS
     blocks: list[IntArray] = []
     for rows, own in zip(places, runs, strict=True):
-        wanted = max(int(np.clip(rows.size / (4.0 * length), MIN_BLOCKS / len(places), MAX_BLOCKS)), 2)
+        wanted = max(int(np.clip(rows.size / (LENGTHS * length), MIN_BLOCKS / len(places), MAX_BLOCKS)), 2)
         if rows.size <= MAX_BLOCKS and not _tells_of_the_next(found.score_weight[rows]):
             wanted = rows.size
         if apart and len(own) > 1:

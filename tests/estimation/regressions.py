@@ -47,7 +47,7 @@ def regression(
         residual=noise,
         score_weight=noise if score is None else score,
         curvature=np.ones(rows),
-        by_loss=np.ones(rows, dtype=bool),
+        channel=np.zeros(rows, dtype=np.int64),
         recording=np.sort(np.arange(rows) % recordings),
         window=np.zeros(rows, dtype=np.int64) if window is None else window,
         time=0.01 * np.arange(rows),

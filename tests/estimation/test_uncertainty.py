@@ -207,7 +207,7 @@ def test_a_robust_loss_need_not_be_the_likelihood_of_the_noise(outliers: float) 
 def test_rows_beside_the_absolute_loss_keep_their_weight() -> None:
     """Static points and gaps are squares: alone they have the intervals of regression, whatever the loss."""
     x, theta = design(300), np.ones(3)
-    squares = replace(regression(x, np.random.default_rng(2).standard_normal(300)), by_loss=np.zeros(300, dtype=bool))
+    squares = replace(regression(x, np.random.default_rng(2).standard_normal(300)), channel=np.full(300, -1))
     found = uncertainty(space(theta, -10, 10), theta, squares, True, "absolute")
     assert found.kind == "gauss_newton"
     assert found.covariance == pytest.approx(np.linalg.inv(x.T @ x), rel=ROUNDING)
