@@ -137,15 +137,16 @@ class Search:
     def _read_better(self, first: Round) -> Problem | None:
         """Return the problem with its inputs read another way, if that does more than any addition of the first round.
 
-        Without a parameter more it has to be worth an addition.
+        Without a parameter more it has to be worth an addition. What is astray comes nearer by chance.
         """
         if self.readings is None or not first.excess.significant(self.level):
             return None
         current = self.bench.current
         enough = current.cost - required(self.bench.base, current)
         reached = min([enough, *(rival.standing.cost for rival in first.choice.rivals)])
-        ends = [(end.cost, problem) for problem, end in self.readings.fitted(self.bench.base) if end.cost < reached]
-        return min(ends, key=lambda pair: pair[0], default=(0.0, None))[1]
+        ends = [pair for pair in self.readings.fitted(self.bench.base) if not (current.astray and pair[1].astray)]
+        able = [(end.cost, read) for read, end in ends if end.cost < reached]
+        return min(able, key=lambda pair: pair[0], default=(0.0, None))[1]
 
     def _better_base(self) -> bool:
         """Look for a better fit of the base model; whether there is one."""
