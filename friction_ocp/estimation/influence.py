@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class Influence:
     def by_loss(self) -> BoolArray:
         """(rows,) whether the loss of the estimation goes by it, as by samples; all else is squares."""
         return self.channel >= 0
+
+    @cached_property
+    def places(self) -> list[IntArray]:
+        """Rows of each recording, and of each set of static points."""
+        return [np.flatnonzero(self.recording == index) for index in np.unique(self.recording)]
 
     @property
     def information(self) -> FloatArray:

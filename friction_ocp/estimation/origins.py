@@ -7,12 +7,13 @@ parts): each change of the residual from one sample to the next, times all that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friction_ocp.estimation.influence import Influence
-from friction_ocp.simulation.grid import BoolArray, FloatArray, IntArray
+from friction_ocp.simulation.grid import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -32,17 +33,18 @@ class Pull:
         return 0.5 * (part + part.T)
 
 
-def pull(found: Influence, weight: FloatArray, wandering: BoolArray) -> Pull:
-    """Return the pull of residuals that count by `weight`, those of `wandering` rows by where their errors arise.
+def pull(found: Influence, weight: FloatArray, wandering: Sequence[IntArray]) -> Pull:
+    """Return the pull of residuals that count by `weight`, (rows,), those of some runs by where their errors arise.
 
-    (rows,) each; wandering are whole free runs of a recording.
+    `wandering` holds the rows of each of these, a whole free run in the order of time.
     """
-    reach, error = found.jacobian.copy(), found.score_weight.copy()
-    weighed = weight[:, None] * found.jacobian
-    runs = np.column_stack([found.recording, found.window, found.channel])
-    for run in np.unique(runs[wandering], axis=0):
-        own = np.flatnonzero(wandering & np.all(runs == run, axis=1))
-        reach[own] = np.cumsum(reach[own][::-1], axis=0)[::-1]
-        error[own] = np.diff(error[own], prepend=0.0)
-        weighed[own] = np.diff(weighed[own], axis=0, prepend=0.0)
+    reach, error, weighed = found.jacobian, found.score_weight, weight[:, None] * found.jacobian
+    if wandering:
+        reach, error = reach.copy(), error.copy()
+    for run in wandering:
+        for channel in np.unique(found.channel[run]):
+            own = run[found.channel[run] == channel]
+            reach[own] = np.cumsum(reach[own][::-1], axis=0)[::-1]
+            error[own] = np.diff(error[own], prepend=0.0)
+            weighed[own] = np.diff(weighed[own], axis=0, prepend=0.0)
     return Pull(reach, error, weighed)

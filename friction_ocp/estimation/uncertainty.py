@@ -155,19 +155,14 @@ def _leverage_limit(told: FloatArray, part: FloatArray) -> float:
     return min(1.0, MOST_LEVERAGE / max(leverage, 1e-300))
 
 
-def _wandering(found: Influence, length: float, parameters: int) -> BoolArray:
-    """Return (rows,) which belong to a free run whose errors may go on to its end, as those of a random walk do.
+def _wandering(found: Influence, length: float, parameters: int) -> list[IntArray]:
+    """Return the rows of free runs whose errors may go on to the end of a recording, as those of a random walk do.
 
     Where a recording has several free runs they end with each.
     """
-    wander, recordings = np.zeros(found.residual.size, dtype=bool), np.unique(found.recording)
-    most = OF_A_WALK + FOR_A_PARAMETER * parameters / recordings.size
-    for index in recordings:
-        rows = np.flatnonzero(found.recording == index)
-        alone = bool(np.all(found.by_loss[rows]) and np.all(found.window[rows] == found.window[rows[0]]))
-        lasting = _tells_of_the_next(found.score_weight[rows])
-        wander[rows] = alone and lasting and rows.size < most * LENGTHS * length
-    return wander
+    most = (OF_A_WALK + FOR_A_PARAMETER * parameters / len(found.places)) * LENGTHS * length
+    short = [rows for rows in found.places if rows.size < most and _tells_of_the_next(found.score_weight[rows])]
+    return [rows for rows in short if found.by_loss[rows].all() and np.ptp(found.window[rows]) == 0]
 
 
 def _blocks(found: Influence, length: float) -> list[IntArray]:
@@ -176,7 +171,7 @@ def _blocks(found: Influence, length: float) -> list[IntArray]:
     The errors of a free run go on to its end, and into none that starts afresh. A few residuals of which none tells of
     the next, such as those of static points, stand each for itself.
     """
-    places = [np.flatnonzero(found.recording == index) for index in np.unique(found.recording)]
+    places = found.places
     runs: list[list[IntArray]] = [np.split(rows, np.flatnonzero(np.diff(found.window[rows])) + 1) for rows in places]
     apart = sum(map(len, runs)) >= MIN_BLOCKS
     blocks: list[IntArray] = []
@@ -202,9 +197,8 @@ def _tells_of_the_next(values: FloatArray) -> bool:
 def _correlation_rows(found: Influence) -> float:
     """Return the integrated autocorrelation length of the residuals, in rows (initial positive sequence)."""
     lengths: list[float] = []
-    for index in np.unique(found.recording):
-        r = found.score_weight[found.recording == index]
-        r = r - r.mean()
+    for rows in found.places:
+        r = found.score_weight[rows] - found.score_weight[rows].mean()
         power = np.abs(np.fft.rfft(r, 2 * r.size)) ** 2
         rho = np.fft.irfft(power)[: r.size]
         rho = rho / max(float(rho[0]), 1e-300)

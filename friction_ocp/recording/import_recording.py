@@ -6,9 +6,8 @@ before that, once for the child and for here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
 
 from friction_ocp.errors import Finding, FrictionOcpError
 from friction_ocp.recording import mdf, parquet, rosbag, spreadsheet, tdms
@@ -68,8 +67,6 @@ LIBRARIES: Mapping[Opener, Library] = {
     open_spreadsheet: spreadsheet.LIBRARY,
 }
 """What a reader cannot do without."""
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
 _HEAD = 4096
 _OF_BYTES = b"\0"
 """What is in the first bytes of every measurement file, whose sizes are numbers of fixed length, and in no text."""
@@ -85,7 +82,8 @@ def import_recording(path: str | Path, map_path: str | Path) -> Recording:
 
 def import_file(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
     """Read a foreign file by a map: static points where the map has `points`, else a recording."""
-    return _guarded(_import, path)(path, map_path)
+    read = _import if _loaded(Path(path)) is open_csv else probed(_import)
+    return read(path, map_path)
 
 
 def _import(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
@@ -99,7 +97,8 @@ def _import(path: str | Path, map_path: str | Path) -> Recording | StaticPoints:
 
 def inspect_file(path: str | Path) -> str:
     """Return what a foreign file holds, one line a signal with its unit, rate, length and range."""
-    return _guarded(_inspect, path)(path)
+    read = _inspect if _loaded(Path(path)) is open_csv else probed(_inspect)
+    return read(path)
 
 
 def _inspect(path: str | Path) -> str:
@@ -111,16 +110,12 @@ def _inspect(path: str | Path) -> str:
         return describe(file, path)
 
 
-def _guarded(
-    read: Callable[Concatenate[str | Path, Arguments], Result], path: str | Path
-) -> Callable[Concatenate[str | Path, Arguments], Result]:
-    """Return a reader that survives what a file does to the library that reads it, that library being loaded."""
-    opener = _opener(Path(path))
-    if opener is open_csv:
-        return read
-    if opener in LIBRARIES and Path(path).exists():
-        LIBRARIES[opener].load(Path(path))
-    return probed(read)
+def _loaded(path: Path) -> Opener:
+    """Return the reader of a file, with its library loaded."""
+    opener = _opener(path)
+    if opener in LIBRARIES and path.exists():
+        LIBRARIES[opener].load(path)
+    return opener
 
 
 def _opener(path: Path) -> Opener:

@@ -28,7 +28,7 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 SECONDS, BYTES_PER_SECOND = 6, 500_000
-"""Processor time of a small file, the library being loaded in it too, and how much more a larger one gets."""
+"""Processor time of a small file, in which what is not loaded yet is loaded, and how much more a larger one gets."""
 _SOUND, _REFUSED, _TOO_LARGE = 0, 1, 2
 
 

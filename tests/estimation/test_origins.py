@@ -14,15 +14,15 @@ from friction_ocp.estimation.origins import pull
 ROWS = 500
 
 
-def drift(rng: np.random.Generator, rows: int = ROWS) -> np.ndarray:
+def drift(rng: np.random.Generator) -> np.ndarray:
     """Return what disturbances that last some samples leave behind in an integrator."""
-    steps = np.convolve(rng.standard_normal(rows + 19), np.ones(20) / 20.0, "valid")
+    steps = np.convolve(rng.standard_normal(ROWS + 19), np.ones(20) / 20.0, "valid")
     return np.cumsum(steps)
 
 
-def smooth(rng: np.random.Generator, columns: int, rows: int = ROWS) -> np.ndarray:
+def smooth(rng: np.random.Generator, columns: int) -> np.ndarray:
     """Return regressors that wander as positions under wrong parameters do."""
-    return np.column_stack([drift(rng, rows) for _ in range(columns)])
+    return np.column_stack([drift(rng) for _ in range(columns)])
 
 
 def test_summed_otherwise_the_scores_are_the_same() -> None:
@@ -31,7 +31,7 @@ def test_summed_otherwise_the_scores_are_the_same() -> None:
     found = regression(rng.standard_normal((ROWS, 2)), rng.standard_normal(ROWS))
     found = replace(found, channel=np.arange(ROWS) % 2)
     weight = rng.uniform(0.5, 1.0, ROWS)
-    seen = pull(found, weight, np.ones(ROWS, dtype=bool))
+    seen = pull(found, weight, [np.arange(ROWS)])
     assert seen.reach.T @ seen.error == pytest.approx(found.jacobian.T @ found.score_weight)
     assert seen.information(np.arange(ROWS)) == pytest.approx(found.jacobian.T @ (weight[:, None] * found.jacobian))
     for channel in (0, 1):
@@ -43,7 +43,7 @@ def test_rows_that_do_not_wander_stay() -> None:
     """As they are in the Jacobian and the scores."""
     rng = np.random.default_rng(2)
     found = regression(rng.standard_normal((ROWS, 2)), rng.standard_normal(ROWS))
-    seen = pull(found, np.ones(ROWS), np.zeros(ROWS, dtype=bool))
+    seen = pull(found, np.ones(ROWS), [])
     assert np.array_equal(seen.reach, found.jacobian) and np.array_equal(seen.error, found.score_weight)
 
 
