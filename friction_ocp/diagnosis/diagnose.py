@@ -27,7 +27,7 @@ from friction_ocp.diagnosis.search import Search
 from friction_ocp.diagnosis.select import Round
 from friction_ocp.diagnosis.slow_torque import SlowTorque, significant
 from friction_ocp.diagnosis.stand_ins import takes_almost_all
-from friction_ocp.diagnosis.stated import can_contradict, contradictions, corrected
+from friction_ocp.diagnosis.stated import contradictions, corrected
 from friction_ocp.diagnosis.straying import DRAWS, strays_as_far
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.effects.effect import Key
@@ -336,11 +336,12 @@ def _checked(
     rounds = list[Round]()
     for _ in range(MOST_PARTS):
         power = innovations(current)
-        found = contradictions(current) if can_contradict(current, power, level) else []
+        found = contradictions(current, power, level)
         if found and not rounds:
             again = begun_again(current, base.model.space)
             if again.objective < current.objective - UNIMPORTANT:
-                current, power, found = again, innovations(again), contradictions(again)
+                current, power = again, innovations(again)
+                found = contradictions(current, power, level)
         choice = corrected(current, found, meant) if found else None
         if choice is None:
             break

@@ -49,33 +49,45 @@ class Contradiction:
     """The largest distance, in prior deviations."""
 
 
-def can_contradict(fitted: FittedModel, left: Excess, level: float) -> bool:
-    """Whether what is `left` is noise as it is known: the distances of fitted values from stated ones count then.
+def contradictions(fitted: FittedModel, left: Excess, level: float) -> list[Contradiction]:
+    """Return what lies beyond the limit in a model that leaves noise, the farthest first, meant to compete or not.
 
-    More is a gap. And less where nobody states the noise of a measured input: a loop that follows the counts of an
-    encoder throws its command to and fro, and that is no noise. With gaps laid for so much of it a rotor looks too
-    light.
+    Where more is `left`, that is a gap, and no distance counts.
     """
     if left.significant(level) or left.ratio > DOUBTED:
-        return False
-    model = fitted.model
-    inputs = [channel for _, channel, _ in driving(model.problem.drive, {})]
-    stated = all(input_floor(model, channel).source in ("noise_std", "resolution") for channel in inputs)
-    return stated or not any(fitted.footing.density.values()) or left.ratio * DOUBTED >= 1.0
-
-
-def contradictions(fitted: FittedModel) -> list[Contradiction]:
-    """Return what lies beyond the limit in a fitted model, the farthest first, meant to compete or not."""
+        return []
     space = fitted.model.space
     distance = _distance(fitted)
     drive = fitted.model.problem.drive
     found: dict[Key, Contradiction] = {}
-    for k in np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED)):
+    far_away = np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED))
+    if _may_attenuate(fitted, left) and not all(_heavier(fitted, k) for k in far_away):
+        return []
+    for k in far_away:
         name, far = space.names[k], float(distance[k])
         key = stated_key(name.partition("@")[0], drive)
         known = found.get(key, Contradiction(*key, (), 0.0))
         found[key] = replace(known, names=(*known.names, name), deviations=max(known.deviations, far))
     return sorted(found.values(), key=lambda item: -item.deviations)
+
+
+def _may_attenuate(fitted: FittedModel, left: Excess) -> bool:
+    """Whether the noise of measured inputs, which nobody states, is less than it is taken for.
+
+    A loop that follows the counts of an encoder throws its command to and fro, and that is no noise. With gaps laid for
+    so much of it, errors of the measured motion attenuate what resists it (Fuller 1987): a rotor looks too light.
+    """
+    model = fitted.model
+    inputs = [channel for _, channel, _ in driving(model.problem.drive, {})]
+    stated = all(input_floor(model, channel).source in ("noise_std", "resolution") for channel in inputs)
+    return not stated and any(fitted.footing.density.values()) and left.ratio * DOUBTED < 1.0
+
+
+def _heavier(fitted: FittedModel, k: int) -> bool:
+    """Whether a parameter is an inertia or a weight, and more than stated, as attenuation makes none."""
+    space = fitted.model.space
+    name = space.names[k].partition("@")[0]
+    return name.endswith((".inertia", ".gravity.torque")) and bool(space.prior_deviations(fitted.theta)[k] > 0.0)
 
 
 def _distance(fitted: FittedModel) -> FloatArray:
