@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
-from friction_ocp.effects.spectrum import LINES, MOST_LINES, peaks, spectrum
+from friction_ocp.effects.spectrum import LINES, MOST_LINES, NEIGHBOURS, peaks, spectrum
 from friction_ocp.simulation.grid import FloatArray
 
 stats: Any = _stats  # its own types are incomplete
@@ -24,6 +25,12 @@ ALIKE, TWICE = 0.5 * (0.25 * np.pi + 1.0), 2.0
 """Share of what waves of any sizes take, from which one size for all recordings that pass them twice is likely: noise
 alone, of Rayleigh's distribution, comes to pi / 4, and a wave to 1. What a model lacks that is no wave at all looks
 like one of another size, too, in every recording."""
+SLOW = 0.25
+"""Share of the places, of those where anything moves, at which waves that are only seen there are still looked for."""
+PEAKS, SHORT_PEAKS = 6, 2
+"""Periods that are tried, and those so short."""
+MOVING = 1e-3
+"""Share of the highest speed below which nothing moves."""
 FINER = 4.0
 """Frequencies that are looked at in each cycle over the whole range of places, once a peak is known."""
 
@@ -42,6 +49,19 @@ class Seen:
     """(n,) that a wave is multiplied with."""
     recording: str = ""
     """Its name; a wave has one phase in all stretches of one."""
+
+    @cached_property
+    def across(self) -> FloatArray:
+        """Return (n,) how far each place, over which the torque is a mean, reaches; rad or s."""
+        return np.abs(np.gradient(self.place))
+
+    def power(self, torque: FloatArray, frequencies: FloatArray) -> FloatArray:
+        """Return what waves of evenly spaced frequencies, each with the phase that suits it, take of a torque."""
+        return spectrum(self.place - self.place[0], self.across, torque, self.factor, frequencies)
+
+    def weight(self, frequency: float) -> FloatArray:
+        """Return (n,) what is seen of a wave of a frequency."""
+        return self.factor * np.maximum(np.sinc(frequency * self.across), 0.0)
 
 
 @dataclass(frozen=True)
@@ -66,39 +86,66 @@ class Likely:
 def likeliest(seen: Sequence[Seen], lowest: float) -> list[Likely]:
     """Return the likeliest waves, longer ones than 1/`lowest` left out; none where nothing is missing.
 
-    Frequencies are looked at half a cycle apart over the longest stretch, up to half a cycle from place to place at
-    typical speed. Where these are too many, stretches are cut until they are not: a long way has many cycles, and a few
-    of them show a period nearly as well. What they show is sharpened along all recordings with one phase, and along
-    each, and told by an F test, by how much it takes and by its sizes whether they have one.
+    Frequencies are looked at up to half a cycle from place to place at typical speed, and up to half a cycle where most
+    moves slowly: the likeliest of those come last. What they show is sharpened along all recordings with one phase, and
+    along each, and told by an F test, by how much it takes and by its sizes whether they have one.
     """
     seen = [one for one in seen if one.place.size >= FEWEST]
-    steps = [np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen]
-    fastest = 0.5 / max(float(np.mean(steps)), 1e-300) if steps else 0.0
-    most = MOST_LINES / 2.0 / max(fastest, 1e-300)
-    parts = [part for one in seen for part in _parts(one, most)]
-    travel = max([float(np.ptp(part.place)) for part in parts], default=0.0)
-    lines = int(np.clip(2.0 * travel * fastest, LINES, MOST_LINES))
-    frequencies = np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
-    frequencies = frequencies[frequencies >= lowest]
-    power, beyond = _spectra(parts, frequencies)
-    if not np.any(power):
+    if not seen:
         return []
-    step, each = 0.5 / max(travel, 1e-300), _by_recording(seen)
-    sharp = [_sharpened(each, float(frequencies[k]), step) for k in peaks(power, beyond)]
+    typical = float(np.mean([np.sqrt(np.mean(np.diff(one.place) ** 2)) for one in seen]))
+    usual, each = _band(seen, lowest, 0.5 / max(typical, 1e-300)), _by_recording(seen)
+    if not np.any(usual.power):
+        return []
+    bands, slow = [(usual, PEAKS)], _slow_step(seen)
+    if 0.5 / slow > usual.frequencies[-1] + NEIGHBOURS * usual.step:
+        bands.append((_band(seen, usual.frequencies[-1], 0.5 / slow), SHORT_PEAKS))
+    sharp = [
+        _sharpened(each, float(band.frequencies[k]), band.step)
+        for band, most in bands
+        for k in peaks(band.power, band.beyond, most)
+    ]
     return [
         Likely(1.0 / frequency, apart, {one.recording: _crest(one, frequency) for one in each}, share)
         for frequency, apart, share in dict.fromkeys(sharp)
     ]
 
 
-def _spectra(seen: Sequence[Seen], frequencies: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the powers of waves in what is missing, and beyond parameters, phases of their own in every stretch."""
+def _slow_step(seen: Sequence[Seen]) -> float:
+    """Return how far slow places reach, of stretches that move."""
+    across = np.concatenate([one.across for one in seen])
+    return float(np.quantile(across[across > MOVING * np.max(across)], SLOW))
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What waves of frequencies up to a highest one, with phases of their own in every stretch, are missing."""
+
+    frequencies: FloatArray
+    power: FloatArray
+    """In what is missing."""
+    beyond: FloatArray
+    """And beyond parameters."""
+    step: float
+    """Between frequencies."""
+
+
+def _band(seen: Sequence[Seen], lowest: float, highest: float) -> _Band:
+    """Return a band of frequencies half a cycle apart over the longest stretch.
+
+    Where these are too many, stretches are cut until they are not: a long way has many cycles, and a few of them show a
+    period nearly as well.
+    """
+    parts = [part for one in seen for part in _parts(one, MOST_LINES / 2.0 / max(highest, 1e-300))]
+    travel = max(float(np.ptp(part.place)) for part in parts)
+    lines = int(np.clip(2.0 * travel * highest, LINES, MOST_LINES))
+    frequencies = np.linspace(0.5, lines / 2.0, lines) / max(travel, 1e-300)
+    frequencies = frequencies[frequencies >= lowest]
     power, beyond = np.zeros(frequencies.size), np.zeros(frequencies.size)
-    for one in seen:
-        place = one.place - one.place[0]
-        power += spectrum(place, one.torque, one.factor, frequencies)
-        beyond += spectrum(place, one.beyond, one.factor, frequencies)
-    return power, beyond
+    for part in parts:
+        power += part.power(part.torque, frequencies)
+        beyond += part.power(part.beyond, frequencies)
+    return _Band(frequencies, power, beyond, 0.5 / max(travel, 1e-300))
 
 
 def _parts(one: Seen, most: float) -> Iterator[Seen]:
@@ -149,8 +196,8 @@ def _of_one_size(each: Sequence[Seen], frequency: float) -> bool:
     if len(passed) < 2:
         return False
     at = np.array([frequency])
-    power = np.array([float(spectrum(one.place - one.place[0], one.beyond, one.factor, at)[0]) for one in passed])
-    weight = np.array([0.5 * float(np.sum(one.factor**2)) for one in passed])
+    power = np.array([float(one.power(one.beyond, at)[0]) for one in passed])
+    weight = np.array([0.5 * float(np.sum(one.weight(frequency) ** 2)) for one in passed])
     alike = float(np.sum(np.sqrt(power * weight))) ** 2 / max(float(np.sum(weight)), 1e-300)
     return alike >= ALIKE * float(np.sum(power))
 
@@ -165,7 +212,7 @@ def _strongest(whole: Sequence[Seen], frequency: float, step: float) -> tuple[fl
         near = near[near > 0.0]
     power = np.zeros(near.size)
     for one in whole:
-        power += spectrum(one.place - one.place[0], one.beyond, one.factor, near)
+        power += one.power(one.beyond, near)
     best = int(np.argmax(power))
     return float(near[best]), float(power[best])
 
@@ -174,7 +221,7 @@ def _crest(one: Seen, frequency: float) -> float:
     """Return the place amid a recording at which the wave of a frequency is highest."""
     amid = 0.5 * float(np.min(one.place) + np.max(one.place))
     turns = 2.0 * np.pi * frequency * (one.place - amid)
-    basis = one.factor[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
+    basis = one.weight(frequency)[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
     cosine, sine = np.linalg.lstsq(basis, one.beyond, rcond=None)[0]
     return amid + float(np.arctan2(sine, cosine) / (2.0 * np.pi * frequency))
 

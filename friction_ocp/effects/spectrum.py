@@ -15,23 +15,30 @@ ndimage: Any = _ndimage  # its own types are incomplete
 
 ComplexArray = npt.NDArray[np.complex128]
 
-PEAKS = 6
-"""Periods that are tried."""
 LINES, MOST_LINES = 600, 4000
 """Frequencies at which a spectrum is looked at."""
+AT_ONCE = 100
+"""Frequencies for which what a mean leaves of a wave is worked out together."""
 NEIGHBOURS = 41
 """Lines over which the level of a spectrum is told, itself in the middle."""
 
 
-def spectrum(place: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray) -> FloatArray:
-    """Return what a wave of each of evenly spaced frequencies takes of squares at uneven places (Lomb 1976)."""
+def spectrum(
+    place: FloatArray, across: FloatArray, values: FloatArray, factor: FloatArray, frequencies: FloatArray
+) -> FloatArray:
+    """Return what a wave of each of evenly spaced frequencies takes of squares at uneven places (Lomb 1976).
+
+    Each value is the mean over places as far apart as `across`, which leaves a sinc of that of a wave, and of one that
+    comes back within it nothing: what is passed slowly tells of short waves.
+    """
     if not frequencies.size:
         return np.zeros(0)
     plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
-    pulled, squares = factor * plain, factor**2
-    whole, power = float(np.sum(squares)), list[FloatArray]()
-    for some in np.array_split(frequencies, max(1, frequencies.size // LINES)):
-        waves = _waves(place, some)
+    power = list[FloatArray]()
+    for some in np.array_split(frequencies, max(1, -(-frequencies.size // AT_ONCE))):
+        seen = factor * np.maximum(np.sinc(0.5 * (some[0] + some[-1]) * across), 0.0)
+        pulled, squares = seen * plain, seen**2
+        whole, waves = float(np.sum(squares)), _waves(place, some)
         pull, twice = waves @ pulled, (waves * waves) @ squares
         gram = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]]).transpose(2, 0, 1)
         both = np.column_stack([pull.real, pull.imag])
@@ -55,15 +62,15 @@ def without(values: FloatArray, shapes: FloatArray) -> FloatArray:
     return values - own @ np.linalg.lstsq(own, values, rcond=None)[0]
 
 
-def peaks(power: FloatArray, beyond: FloatArray) -> list[int]:
-    """Return the places of the highest peaks of two spectra, and of those highest over the level around them, in turn.
+def peaks(power: FloatArray, beyond: FloatArray, most: int) -> list[int]:
+    """Return the places of `most` peaks of two spectra: of the highest, and those highest over the level around, in turn.
 
     `power` is that of all that is missing, `beyond` that of what parameters cannot make up for.
     """
     orders = [order for of in (power, beyond) for order in _by_height(of, (of, of / _level(of)))]
     longest = max(order.size for order in orders)
     in_turn = [int(order[k]) for k in range(longest) for order in orders if k < order.size]
-    return list(dict.fromkeys(in_turn))[:PEAKS]
+    return list(dict.fromkeys(in_turn))[:most]
 
 
 def _by_height(power: FloatArray, heights: Sequence[FloatArray]) -> list[IntArray]:

@@ -16,7 +16,7 @@ def test_a_wave_takes_what_a_fit_of_it_alone_does(lines: int) -> None:
     factor = np.where(np.sin(place) > 0.0, 1.0, -0.5)
     values = factor * (0.3 + np.cos(2.0 * np.pi * 3.1 * place)) + rng.standard_normal(place.size)
     frequencies = np.linspace(0.05, 12.0, lines)
-    found = spectrum(place, values, factor, frequencies)
+    found = spectrum(place, np.zeros(place.size), values, factor, frequencies)
     plain = values - factor * (factor @ values) / (factor @ factor)
     expected = list[float]()
     for frequency in frequencies:
