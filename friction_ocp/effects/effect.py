@@ -62,6 +62,8 @@ class Track:
     """Over a few samples each: what is fast, too, and more noise."""
     recording: str = ""
     """Its name; pieces of one have the same."""
+    alone: Mapping[str, Missing] = field(default_factory=dict[str, Missing])
+    """By shaft, over the fine segments: where it alone lacks torque; empty where all turn as one."""
 
     def ordinary(self, shaft: str) -> FloatArray:
         """Return (segments, 4) what constant torque, friction and inertia of a shaft do over the fine segments."""
@@ -152,9 +154,12 @@ class Clues:
         turning = over == "theta" and shaft not in self.linear
         if turning:
             lowest = min(lowest, 1.0 / (2.0 * np.pi))
-        found = likeliest(
-            [self._seen(track, shaft, over, against_motion, against_torque) for track in self.tracks], lowest
-        )
+        asked = shaft, over, against_motion, against_torque
+        found = likeliest([self._seen(track, track.finely, *asked) for track in self.tracks], lowest)
+        if found and all(shaft in track.alone for track in self.tracks):
+            alone = likeliest([self._seen(track, track.alone[shaft], *asked) for track in self.tracks], lowest)
+            most = max(one.share for one in found)
+            found = [*(one for one in alone if one.share > most), *found]
         if found:
             return found
         turns = 2.0 * np.pi / np.array([1.0, 2.0, 4.0, 6.0, 12.0])
@@ -162,9 +167,11 @@ class Clues:
         return [Likely(float(period)) for period in usual]
 
     @staticmethod
-    def _seen(track: Track, shaft: str, over: str, against_motion: bool, against_torque: str | None) -> Seen:
+    def _seen(
+        track: Track, item: Missing, shaft: str, over: str, against_motion: bool, against_torque: str | None
+    ) -> Seen:
         """Return what is missing along a recording."""
-        item, torque = track.finely, track.finely.torque[shaft]
+        torque = item.torque[shaft]
         factor = np.ones(torque.size)
         if against_motion:
             factor = np.sign(item.omega[shaft])

@@ -63,7 +63,7 @@ def without(values: FloatArray, shapes: FloatArray) -> FloatArray:
 
 
 def peaks(power: FloatArray, beyond: FloatArray, most: int) -> list[int]:
-    """Return the places of `most` peaks of two spectra: of the highest, and those highest over the level around, in turn.
+    """Return the places of `most` peaks of two spectra, in turn of the highest and of those highest over their level.
 
     `power` is that of all that is missing, `beyond` that of what parameters cannot make up for.
     """
