@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from friction_ocp.diagnosis.fitted_model import FittedModel
+from friction_ocp.diagnosis.lateness import latenesses
 from friction_ocp.diagnosis.missing_torque import Lacking, Watch, lacking, rms, shaft_motion
 from friction_ocp.drive.gearing import relative_speeds
 from friction_ocp.drive.mechanism import column
@@ -47,7 +48,8 @@ def _clues_of(fitted: FittedModel) -> Clues:
     tracks = tuple(_track(fitted, *parts) for parts in zip(names, tables, lacked, strict=True))
     shafts = fitted.model.problem.drive.shafts
     linear = frozenset(shaft.name for shaft in shafts if shaft.motion == "linear")
-    return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path), linear)
+    late = latenesses(fitted.model.problem.drive, fitted.linear.program.experiments, by_path)
+    return Clues(tracks, by_path, typical, _steady_speeds(fitted, by_path), linear, late)
 
 
 def _steady_speeds(fitted: FittedModel, numbers: Mapping[str, float]) -> dict[str, FloatArray]:

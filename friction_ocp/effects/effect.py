@@ -85,6 +85,8 @@ class Clues:
     """By shaft, rad/s: speeds at which static points were taken, where there are any."""
     linear: frozenset[str] = frozenset()
     """Shafts that move along a line: nothing of them comes back with a turn."""
+    late: Mapping[str, float] = field(default_factory=dict[str, float])
+    """By channel: how late it shows what another one shows, s; without those that are not."""
     _known_waves: dict[tuple[str, str, bool, str | None], list[Likely]] = field(
         default_factory=lambda: {}, init=False, repr=False, compare=False
     )

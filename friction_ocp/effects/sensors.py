@@ -94,5 +94,7 @@ class SensorDelayEffect(AbstractEffect):
         """Return the drive with a late channel; none shows the future where a late input can make outputs early."""
         step, path = float(np.median(np.diff(clues.tracks[0].time))), f"{place}.delay"
         earliest = 0.0 if drive.acted_on is not None else -20.0 * step
-        added = change_channel(drive, place, delay=Free(step, earliest, 100.0 * step))
-        return Augmentation(added, {path: 0.0}, (Trial(({path: step},)),))
+        latest, late = 100.0 * step, clues.late.get(place, 0.0)
+        added = change_channel(drive, place, delay=Free(step, earliest, latest))
+        large = ({path: late},) if late and earliest < late < latest else ()
+        return Augmentation(added, {path: 0.0}, (Trial(({path: step},)),), outright=large)
