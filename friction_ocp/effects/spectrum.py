@@ -39,7 +39,7 @@ def spectrum(
         seen = factor * np.maximum(np.sinc(0.5 * (some[0] + some[-1]) * across), 0.0)
         pulled, squares = seen * plain, seen**2
         whole, waves = float(np.sum(squares)), _waves(place, some)
-        pull, twice = waves @ pulled, (waves * waves) @ squares
+        pull, twice = np.einsum("kn,n->k", waves, pulled), np.einsum("kn,n->k", waves * waves, squares)
         gram = 0.5 * np.array([[whole + twice.real, twice.imag], [twice.imag, whole - twice.real]]).transpose(2, 0, 1)
         both = np.column_stack([pull.real, pull.imag])
         power.append(np.einsum("kp,kpq,kq->k", both, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), both))

@@ -96,6 +96,23 @@ def test_a_wave_of_friction_is_found_beside_what_parameters_could_do() -> None:
     assert max(found.values()) < 1.0 / float(np.ptp(theta))
 
 
+def test_a_wave_is_found_where_only_creeping_shows_it() -> None:
+    """Fast moves pass more than one within each segment, and their means tell nothing of it."""
+    rng, tracks = np.random.default_rng(7), list[Track]()
+    time, middle = INTERVAL * np.arange(SAMPLES), np.arange(SEGMENT // 2, SAMPLES, SEGMENT)
+    for k, fastest in enumerate((20.0 * SPEED, 30.0 * SPEED, 0.1 * SPEED)):
+        omega = fastest * np.sin(2.0 * np.pi * time / 1.7)
+        theta = INTERVAL * np.cumsum(omega)
+        wave = 0.1 * np.cos(POLES * theta + 0.4)
+        torque = wave.reshape(-1, SEGMENT).mean(axis=1) + 0.02 * rng.standard_normal(middle.size)
+        missing = Missing(middle, {"motor": torque}, {"motor": theta[middle]}, {"motor": omega[middle]})
+        moved = {"motor": theta}, {"motor": omega}, {"drive": np.ones(SAMPLES)}
+        tracks.append(Track(time, *moved, missing, missing, f"run-{k}"))
+    found = Clues(tuple(tracks), {}, {"motor": 1.0}).periods("motor", "theta")
+    slow = float(np.ptp(tracks[-1].theta["motor"]))
+    assert min(abs(1.0 / period - POLES / (2.0 * np.pi)) for period in found) < 0.1 / slow
+
+
 @pytest.mark.parametrize("apart", [0.0, 40.0])
 def test_a_wave_is_found_over_a_long_way(apart: float) -> None:
     """Thousands of waves, all along or in pieces far from each other: to a part of a cycle over the whole way.
