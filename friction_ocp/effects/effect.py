@@ -117,11 +117,11 @@ class Clues:
         return [wave.period for wave in self.waves(shaft, over, against_motion, against_torque)]
 
     def apart(self, waves: Sequence[Likely]) -> tuple[str, ...]:
-        """Return the names of all recordings where the likeliest wave has another phase in each; none where it has not.
+        """Return the names of all recordings where the wave that takes most has another phase in each, else none.
 
         Nor where there are static points: no phase is known at those.
         """
-        return self.recordings if waves[0].apart and not self.steady else ()
+        return self.recordings if max(waves, key=lambda one: one.share).apart and not self.steady else ()
 
     @property
     def recordings(self) -> tuple[str, ...]:
