@@ -31,7 +31,7 @@ from friction_ocp.estimation.score import Errors, FreeRun, channel_errors, simul
 from friction_ocp.estimation.static_points import StaticFit, misses_points, static_fit
 from friction_ocp.estimation.uncertainty import Uncertainty, uncertainty
 from friction_ocp.estimation.unknown_noise import MOST_SAMPLES
-from friction_ocp.estimation.warnings import warnings_of
+from friction_ocp.estimation.warnings import LOST_FREE_RUN, warnings_of
 from friction_ocp.estimation.whiteness import Whiteness, told_by_rounding, whiteness
 from friction_ocp.execution.linear_algebra import with_one_thread
 from friction_ocp.simulation.grid import FloatArray
@@ -185,6 +185,7 @@ def conclude(model: Model, fitted: Fitted, build_seconds: float, seconds: float)
         residuals=residuals,
         curves=friction_curves(model, theta, doubt.covariance, doubt.reach, simulation.train),
         warnings=(
+            *([LOST_FREE_RUN] if model.lost_free_run else []),
             *warnings_of(solution, parameters, doubt, residuals, simulation, _drifts(model, simulation, white)),
             *(_missed_warning(fit) for fit in missed),
             *(_loud_warning(name, ratio) for name, ratio in louder.items()),

@@ -14,7 +14,7 @@ from friction_ocp.estimation.kept_loss import fit_kept
 from friction_ocp.estimation.model import Model, laid_for, late_of, with_late
 from friction_ocp.estimation.noise_level import most_likely, with_levels
 from friction_ocp.estimation.points_fit import fit_points
-from friction_ocp.estimation.preparation import is_moved_by_inputs, joined_by_input_noise
+from friction_ocp.estimation.preparation import is_moved_by_inputs, joined_by_input_noise, may_leave_free_runs
 from friction_ocp.estimation.progress import Phases, Progress, silent
 from friction_ocp.estimation.refinement import refined
 from friction_ocp.estimation.release import within_reach
@@ -74,8 +74,11 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
         model = replace(model, noisy_inputs=())
         model, fitted = synchronised(model, fit(model, progress), phases)
         fitted = through_short_segments(model, fitted, phases)
-        if not rules and is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
+        done = fitted.solution.converged and is_noise(fitted.program, fitted.solution)
+        if not rules and not done and is_moved_by_inputs(model):
             model, fitted = _by_input_noise(model, progress, phases) or (model, fitted)
+        elif not rules and not done and may_leave_free_runs(model):
+            model, fitted = _instead_of_free_runs(model, progress, phases) or (model, fitted)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
     finer, fitted = refined(model, fitted, phases)
@@ -102,6 +105,19 @@ def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[M
     if model.joins_noise or is_noise(joined.program, joined.solution):
         return replace(seen, noisy_inputs=()), joined
     return None
+
+
+def _instead_of_free_runs(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
+    """Fit on segments that noise of measured inputs joins; None where that leads to no end, or leaves more than noise.
+
+    Such noise makes a free run wander: what is left of it is no sensor's noise, and its kinks may leave no way to an
+    end.
+    """
+    found = _by_input_noise(model, progress, phases)
+    if found is None or not found[1].solution.converged:
+        return None
+    seen, joined = found
+    return replace(seen, lost_free_run=True), joined
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:

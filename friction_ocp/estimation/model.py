@@ -72,6 +72,8 @@ class Model:
     """Whether fits end with programs in which that noise is an unknown of every sample."""
     joins_noise: bool = False
     """Whether the noise of measured inputs joins segments, and no torque noise that is stated."""
+    lost_free_run: bool = False
+    """Whether it does so because fits of free runs leave more than noise, or lead to no end."""
 
     @property
     def nominal(self) -> FloatArray:

@@ -73,10 +73,20 @@ def may_be_joined_by_inputs(model: Model) -> bool:
 
     Not where recordings are so long that these take too much time.
     """
+    return is_relaxed(model) and _shakes(model)
+
+
+def may_leave_free_runs(model: Model) -> bool:
+    """Whether such segments may be fitted instead of free runs, which nobody asked for by name."""
+    return fits_free_run(model) and not model.problem.estimation.fit and _shakes(model)
+
+
+def _shakes(model: Model) -> bool:
+    """Whether noise of measured inputs, and none of torques that is stated, moves a drive; not over long recordings."""
     options = model.problem.estimation
     stated = model.process_noise or options.estimated_noise or options.segment
     short = sum(item.grid.time.size for item in model.train) <= MOST_SAMPLES
-    if not model.train or not short or stated or options.loss != "squares" or not is_relaxed(model):
+    if not model.train or not short or stated or options.loss != "squares":
         return False
     return any(density > 0.0 for density in made_by_inputs(model).density.values())
 

@@ -20,6 +20,11 @@ WHAT_TO_DO = (
     "estimation: {process_noise: {SHAFT: estimate}}, or noise_std at the input."
 )
 
+LOST_FREE_RUN = (
+    "Noise of a measured input moves free runs over whole recordings by more than the sensors err, so that no fit to "
+    "these is a good one. The values are those of short segments that such noise joins, which leave no more than noise."
+)
+
 
 class NamedVerdict(Protocol):
     """A parameter with its verdict."""
