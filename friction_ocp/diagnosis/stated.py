@@ -61,7 +61,7 @@ def contradictions(fitted: FittedModel, left: Excess, level: float) -> list[Cont
     drive = fitted.model.problem.drive
     found: dict[Key, Contradiction] = {}
     far_away = np.flatnonzero(np.isfinite(space.prior_std) & (distance > CONTRADICTED))
-    if _may_attenuate(fitted, left) and not all(_heavier(fitted, k) for k in far_away):
+    if _may_attenuate(fitted, left) and not all(_heavier(fitted, int(k)) for k in far_away):
         return []
     for k in far_away:
         name, far = space.names[k], float(distance[k])
