@@ -74,10 +74,9 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
         model = replace(model, noisy_inputs=())
         model, fitted = synchronised(model, fit(model, progress), phases)
         fitted = through_short_segments(model, fitted, phases)
-        done = fitted.solution.converged and is_noise(fitted.program, fitted.solution)
-        if not rules and not done and is_moved_by_inputs(model):
+        if not rules and is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
             model, fitted = _by_input_noise(model, progress, phases) or (model, fitted)
-        elif not rules and not done and may_leave_free_runs(model):
+        elif not rules and may_leave_free_runs(model) and not _is_done(fitted):
             model, fitted = _instead_of_free_runs(model, progress, phases) or (model, fitted)
     if model.train:
         model, fitted = relaid(model, fitted, phases)
@@ -105,6 +104,10 @@ def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[M
     if model.joins_noise or is_noise(joined.program, joined.solution):
         return replace(seen, noisy_inputs=()), joined
     return None
+
+
+def _is_done(fitted: Fitted) -> bool:
+    return fitted.solution.converged and is_noise(fitted.program, fitted.solution)
 
 
 def _instead_of_free_runs(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
