@@ -76,8 +76,20 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
         fitted = through_short_segments(model, fitted, phases)
         if not rules and is_moved_by_inputs(model) and not is_noise(fitted.program, fitted.solution):
             model, fitted = _by_input_noise(model, progress, phases) or (model, fitted)
-        elif not rules and may_leave_free_runs(model) and not _is_done(fitted):
-            model, fitted = _instead_of_free_runs(model, progress, phases) or (model, fitted)
+    if rules or not may_leave_free_runs(model):
+        return _ended(model, fitted, phases)
+    if fitted.solution.converged:
+        model, fitted = _ended(model, fitted, phases)
+        if is_noise(fitted.program, fitted.solution):
+            return model, fitted
+        found = _instead_of_free_runs(model, progress, phases)
+        return (model, fitted) if found is None else _ended(*found, phases)
+    found = _instead_of_free_runs(model, progress, phases)
+    return _ended(*(found or (model, fitted)), phases)
+
+
+def _ended(model: Model, fitted: Fitted, phases: Phases) -> tuple[Model, Fitted]:
+    """Return a fit with gaps that are laid, and integrator steps that are short enough, for what it found."""
     if model.train:
         model, fitted = relaid(model, fitted, phases)
     finer, fitted = refined(model, fitted, phases)
@@ -104,10 +116,6 @@ def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[M
     if model.joins_noise or is_noise(joined.program, joined.solution):
         return replace(seen, noisy_inputs=()), joined
     return None
-
-
-def _is_done(fitted: Fitted) -> bool:
-    return fitted.solution.converged and is_noise(fitted.program, fitted.solution)
 
 
 def _instead_of_free_runs(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:

@@ -78,7 +78,8 @@ def may_be_joined_by_inputs(model: Model) -> bool:
 
 def may_leave_free_runs(model: Model) -> bool:
     """Whether such segments may be fitted instead of free runs, which nobody asked for by name."""
-    return fits_free_run(model) and not model.problem.estimation.fit and _shakes(model)
+    named = model.problem.estimation.fit or not model.space.names
+    return not named and fits_free_run(model) and _shakes(model)
 
 
 def _shakes(model: Model) -> bool:
