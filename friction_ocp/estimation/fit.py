@@ -82,9 +82,9 @@ def settled(model: Model, progress: Progress = silent) -> tuple[Model, Fitted]:
         model, fitted = _ended(model, fitted, phases)
         if is_noise(fitted.program, fitted.solution):
             return model, fitted
-        found = _instead_of_free_runs(model, progress, phases)
+        found = _instead_of_free_runs(model, fitted, progress, phases)
         return (model, fitted) if found is None else _ended(*found, phases)
-    found = _instead_of_free_runs(model, progress, phases)
+    found = _instead_of_free_runs(model, fitted, progress, phases)
     return _ended(*(found or (model, fitted)), phases)
 
 
@@ -118,17 +118,22 @@ def _by_input_noise(model: Model, progress: Progress, phases: Phases) -> tuple[M
     return None
 
 
-def _instead_of_free_runs(model: Model, progress: Progress, phases: Phases) -> tuple[Model, Fitted] | None:
-    """Fit on segments that noise of measured inputs joins; None where that leads to no end, or leaves more than noise.
+def _instead_of_free_runs(
+    model: Model, free: Fitted, progress: Progress, phases: Phases
+) -> tuple[Model, Fitted] | None:
+    """Fit on segments that noise of measured inputs joins, from the end of a fit of free runs.
+
+    None where that leads to no end, or leaves more than noise.
 
     Such noise makes a free run wander: what is left of it is no sensor's noise, and its kinks may leave no way to an
     end.
     """
-    found = _by_input_noise(model, progress, phases)
+    begun = replace(model, space=model.space.moved(free.solution.point.theta))
+    found = _by_input_noise(begun, progress, phases)
     if found is None or not found[1].solution.converged:
         return None
     seen, joined = found
-    return replace(seen, lost_free_run=True), joined
+    return replace(seen, space=model.space, lost_free_run=True), joined
 
 
 def relaid(model: Model, fitted: Fitted, phases: Phases, done: int = 0) -> tuple[Model, Fitted]:

@@ -41,8 +41,8 @@ def record(noise: float) -> Recording:
     )
 
 
-def identified(folder: Path, noise: float, estimation: dict[str, Any]) -> Estimate:
-    """Return what is identified of the pendulum."""
+def identified(folder: Path, noise: float, estimation: dict[str, Any], inertia: float = 0.012) -> Estimate:
+    """Return what is identified of the pendulum, its inertia guessed."""
     write_recording(record(noise), folder / "a.h5")
     friction = {
         "law": "coulomb_viscous",
@@ -51,7 +51,7 @@ def identified(folder: Path, noise: float, estimation: dict[str, Any]) -> Estima
     }
     arm = {
         "name": "arm",
-        "inertia": {"guess": 0.012, "min": 1e-3, "max": 0.1},
+        "inertia": {"guess": inertia, "min": 1e-3, "max": 0.1},
         "gravity": {"torque": {"guess": 1.65, "min": 0, "max": 20}},
         "friction": friction,
     }
@@ -94,6 +94,13 @@ def test_noise_of_the_current_joins_segments_instead(tmp_path: Path) -> None:
     known, before = widths(found), widths(free)
     assert all(known[name] < 0.3 * before[name] for name in TRUTH)
     assert known["arm.friction.tau_c"] < 0.03
+
+
+def test_segments_begin_where_free_runs_have_ended(tmp_path: Path) -> None:
+    """So that their end does not hang on the guesses."""
+    one, other = (identified(tmp_path, NOISE, {}, guess) for guess in (0.012, 0.03))
+    known = widths(one)
+    assert all(abs(one.values[name] - other.values[name]) < 0.1 * known[name] * TRUTH[name] for name in TRUTH)
 
 
 def test_free_runs_are_fitted_where_the_current_is_known(tmp_path: Path) -> None:
