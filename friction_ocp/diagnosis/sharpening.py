@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from friction_ocp.diagnosis.easing import along
 from friction_ocp.diagnosis.fitted_model import FittedModel
-from friction_ocp.diagnosis.footing import Footing
+from friction_ocp.diagnosis.footing import WITHIN, Footing
 from friction_ocp.diagnosis.kinks import freed, loosened
 from friction_ocp.diagnosis.linear import linear_program
 from friction_ocp.diagnosis.options import level_of
@@ -46,13 +46,13 @@ def seen_on(foot: Footing, fitted: FittedModel) -> FittedModel:
 def sharpened(model: Model, foot: Footing) -> Footing:
     """Return a footing on which the noise of measured inputs is an unknown of every sample.
 
-    The same where it moves no channel by more than that shows itself, where recordings are too long or not sampled as
-    their inputs are, and where torque noise is stated: that moves the machine.
+    The same where it moves no channel within a segment by more than segments bear, where recordings are too long or not
+    sampled as their inputs are, and where torque noise is stated: that moves the machine.
     """
     stated = bool(model.problem.estimation.process_noise)
     if foot.noisy_inputs or not foot.joined or stated:
         return foot
     inputs = tellable_inputs(model, foot.train)
-    if not inputs or not noise_rules(model, foot):
+    if not inputs or not noise_rules(model, foot, WITHIN):
         return foot
     return replace(foot, noise=blurred(model, foot), noisy_inputs=inputs)

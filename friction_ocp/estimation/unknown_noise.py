@@ -50,11 +50,11 @@ def tellable_inputs(model: Model, items: Sequence[Experiment]) -> tuple[str, ...
     return inputs if short and _in_step(items, model, inputs) else ()
 
 
-def noise_rules(model: Model, noise: TorqueNoise) -> bool:
-    """Whether torque noise moves a channel, within the shortest segment, by more than the noise of its own."""
+def noise_rules(model: Model, noise: TorqueNoise, share: float = 1.0) -> bool:
+    """Whether torque noise moves a channel, within the shortest segment, by more variance than a share of its own."""
     first = model.train[0]
     moved = within(model, noise, first, SHORTEST * float(np.median(first.grid.dt)))
-    return bool(np.any(moved > model.noise**2))
+    return bool(np.any(moved > share * model.noise**2))
 
 
 def blurred(model: Model, noise: TorqueNoise) -> FloatArray:
