@@ -68,7 +68,7 @@ FURTHER = 0.1
 SUBHARMONIC = 2.0
 """Period over that of a wave that a further one begins with, where nothing of another period is seen to be missing."""
 ORDERS = (1, 2, 3)
-"""Of a wave and its overtones: where one of these has another phase in each recording, all have."""
+"""Of a wave and its overtones: where what is missing most of these has another phase in each recording, all have."""
 SAME_PERIOD = 0.1
 """Relative difference up to which a period of what is missing is taken for that of the wave, or of an overtone."""
 
@@ -146,7 +146,7 @@ class AbstractWaveEffect(AbstractEffect):
         period = clues.numbers.get(f"{path}.period", start_of(part.period))
         _, found = self.size_and_waves(drive, place, clues)
         own = [one for one in found if any(abs(order * one.period / period - 1.0) < SAME_PERIOD for order in ORDERS)]
-        apart = next(filter(None, (clues.apart([one]) for one in own)), ())
+        apart = clues.apart(own) if own else ()
         plain = not (has_own(part) or part.has_overtones or part.has_other)
         if plain and apart:
             part, off, trials = set_apart(part, path, clues, period, apart)
