@@ -20,6 +20,7 @@ from friction_ocp.estimation.gap import gap_covariance
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
 from friction_ocp.estimation.program import Program
+from friction_ocp.estimation.segments import Segments
 from friction_ocp.estimation.stages import relaxed
 from friction_ocp.estimation.torque_noise import driving, speed_ratio
 from friction_ocp.simulation.grid import FloatArray, IntArray
@@ -168,11 +169,9 @@ def _smoothers(
 
 def _stiffened(model: Model, program: Program) -> Program:
     """Return a program in which hardly anything jumps but what torques move."""
-    pairs = zip(program.experiments, program.segments, strict=True)
-    spans = [np.diff(item.grid.time[cut.first])[:-1] for item, cut in pairs]
-    weights = [
-        inverse_roots(gap_covariance(model, item, each, STIFF**2))
-        for item, each in zip(program.experiments, spans, strict=True)
-    ]
-    cuts = zip(program.segments, weights, strict=True)
-    return replace(program, segments=tuple(replace(cut, gap_weight=weight) for cut, weight in cuts))
+
+    def stiff(item: Experiment, cut: Segments) -> Segments:
+        spans = np.diff(item.grid.time[cut.first])[:-1]
+        return replace(cut, gap_weight=inverse_roots(gap_covariance(model, item, spans, STIFF**2)))
+
+    return replace(program, segments=tuple(map(stiff, program.experiments, program.segments)))

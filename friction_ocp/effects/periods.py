@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.stats as _stats  # pyright: ignore[reportMissingTypeStubs]
 
-from friction_ocp.effects.spectrum import LINES, MOST_LINES, NEIGHBOURS, peaks, spectrum
+from friction_ocp.effects.spectrum import LINES, MOST_LINES, NEIGHBOURS, left_by_means, peaks, spectrum
 from friction_ocp.simulation.grid import FloatArray
 
 stats: Any = _stats  # its own types are incomplete
@@ -61,7 +61,7 @@ class Seen:
 
     def weight(self, frequency: float) -> FloatArray:
         """Return (n,) what is seen of a wave of a frequency."""
-        return self.factor * np.maximum(np.sinc(frequency * self.across), 0.0)
+        return self.factor * left_by_means(frequency, self.across)
 
 
 @dataclass(frozen=True)

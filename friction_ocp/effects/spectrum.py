@@ -28,15 +28,14 @@ def spectrum(
 ) -> FloatArray:
     """Return what a wave of each of evenly spaced frequencies takes of squares at uneven places (Lomb 1976).
 
-    Each value is the mean over places as far apart as `across`, which leaves a sinc of that of a wave, and of one that
-    comes back within it nothing: what is passed slowly tells of short waves.
+    Each value is the mean over places as far apart as `across`.
     """
     if not frequencies.size:
         return np.zeros(0)
     plain = values - factor * float(np.sum(factor * values) / max(float(np.sum(factor**2)), 1e-300))
     power = list[FloatArray]()
     for some in np.array_split(frequencies, max(1, -(-frequencies.size // AT_ONCE))):
-        seen = factor * np.maximum(np.sinc(0.5 * (some[0] + some[-1]) * across), 0.0)
+        seen = factor * left_by_means(0.5 * float(some[0] + some[-1]), across)
         pulled, squares = seen * plain, seen**2
         whole, waves = float(np.sum(squares)), _waves(place, some)
         pull, twice = np.einsum("kn,n->k", waves, pulled), np.einsum("kn,n->k", waves * waves, squares)
@@ -44,6 +43,14 @@ def spectrum(
         both = np.column_stack([pull.real, pull.imag])
         power.append(np.einsum("kp,kpq,kq->k", both, np.linalg.pinv(gram, rcond=1e-9, hermitian=True), both))
     return np.concatenate(power)
+
+
+def left_by_means(frequency: float, across: FloatArray) -> FloatArray:
+    """Return (n,) what means over places as far apart as `across` leave of a wave; nothing if it comes back within.
+
+    What is passed slowly tells of short waves.
+    """
+    return np.maximum(np.sinc(frequency * across), 0.0)
 
 
 def _waves(place: FloatArray, frequencies: FloatArray) -> ComplexArray:
