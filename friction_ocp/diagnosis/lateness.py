@@ -8,6 +8,7 @@ import numpy as np
 
 from friction_ocp.drive.gearing import relative_speeds
 from friction_ocp.drive.parts import Drive
+from friction_ocp.effects.periods import MOVING
 from friction_ocp.effects.spectrum import without
 from friction_ocp.estimation.experiment import Experiment
 from friction_ocp.simulation.grid import FloatArray
@@ -17,8 +18,6 @@ MOST = 0.5
 LEAST = 0.5
 """Intervals between samples below which a channel is not late: a spring that carries viscous friction looks like that,
 and small delays need no other beginning than none."""
-STANDS = 1e-3
-"""Share of the highest speed below which friction has no direction."""
 
 
 def latenesses(drive: Drive, experiments: Sequence[Experiment], numbers: Mapping[str, float]) -> dict[str, float]:
@@ -51,7 +50,7 @@ def _late(experiments: Sequence[Experiment], own: tuple[int, float], other: tupl
         return 0.0
     for item in experiments:
         place, rate, bend = (part[:, reference] / per for part in (item.smooth, item.rate, item.curvature))
-        against = np.where(np.abs(item.rate[:, reference]) > STANDS * fastest, np.sign(rate), 0.0)
+        against = np.where(np.abs(item.rate[:, reference]) > MOVING * fastest, np.sign(rate), 0.0)
         shapes = np.column_stack([np.ones(place.size), place, against, bend])
         difference.append(without(item.smooth[:, k] / scale - place, shapes))
         speed.append(without(rate, shapes))

@@ -18,7 +18,7 @@ from friction_ocp.diagnosis.polishing import polished, timed
 from friction_ocp.diagnosis.worth import innovations
 from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.nodes import solve_nodes
-from friction_ocp.estimation.unknown_noise import blurred, noise_rules, tellable_inputs
+from friction_ocp.estimation.unknown_noise import blurred, noise_moves, tellable_inputs
 from friction_ocp.simulation.grid import FloatArray
 
 
@@ -53,6 +53,6 @@ def sharpened(model: Model, foot: Footing) -> Footing:
     if foot.noisy_inputs or not foot.joined or stated:
         return foot
     inputs = tellable_inputs(model, foot.train)
-    if not inputs or not noise_rules(model, foot, WITHIN):
+    if not inputs or not noise_moves(model, foot, WITHIN):
         return foot
     return replace(foot, noise=blurred(model, foot), noisy_inputs=inputs)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from friction_ocp.drive.parts import Channel, Drive, Motor, Shaft, Transmission
 from friction_ocp.drive.units import DRIVE_TORQUE
-from friction_ocp.effects.periods import Likely, Seen, likeliest
+from friction_ocp.effects.periods import MOVING, Likely, Seen, likeliest
 from friction_ocp.effects.spectrum import without
 from friction_ocp.friction.element import FrictionElement
 from friction_ocp.parameters import Free, bind
@@ -197,7 +197,7 @@ class Clues:
         Of static points, where there are any: they lie where somebody wanted to see friction.
         """
         speed = np.abs(self.steady.get(shaft, self.speeds(shaft)))
-        moving = speed[speed > 1e-3 * float(np.max(speed, initial=0.0))]
+        moving = speed[speed > MOVING * float(np.max(speed, initial=0.0))]
         return [float(value) for value in np.quantile(moving, shares)] if moving.size else [1.0 for _ in shares]
 
 

@@ -123,10 +123,8 @@ def _instead_of_free_runs(
 ) -> tuple[Model, Fitted] | None:
     """Fit on segments that noise of measured inputs joins, from the end of a fit of free runs.
 
-    None where that leads to no end, or leaves more than noise.
-
     Such noise makes a free run wander: what is left of it is no sensor's noise, and its kinks may leave no way to an
-    end.
+    end. None where segments lead to no end either, or leave more than noise.
     """
     begun = replace(model, space=model.space.moved(free.solution.point.theta))
     found = _by_input_noise(begun, progress, phases)

@@ -20,7 +20,7 @@ from friction_ocp.estimation.torque_noise import (
     seen_variance,
     torque_covariance,
 )
-from friction_ocp.estimation.unknown_noise import MOST_SAMPLES, noise_rules, tellable_inputs
+from friction_ocp.estimation.unknown_noise import MOST_SAMPLES, noise_moves, tellable_inputs
 
 WITHIN = 0.1
 """Variance that torque noise may add within a segment over that of a channel: it is taken for noise of its samples."""
@@ -39,7 +39,7 @@ def prepare_identification(problem: Problem) -> Model:
         return model
     plain = not options.process_noise and not options.segment and options.loss == "squares"
     inputs = tellable_inputs(model, model.train) if plain else ()
-    if inputs and noise_rules(model, made_by_inputs(model)):
+    if inputs and noise_moves(model, made_by_inputs(model)):
         model = replace(model, noisy_inputs=inputs)
     if fits_free_run(model):
         return model

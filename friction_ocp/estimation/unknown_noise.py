@@ -50,7 +50,7 @@ def tellable_inputs(model: Model, items: Sequence[Experiment]) -> tuple[str, ...
     return inputs if short and _in_step(items, model, inputs) else ()
 
 
-def noise_rules(model: Model, noise: TorqueNoise, share: float = 1.0) -> bool:
+def noise_moves(model: Model, noise: TorqueNoise, share: float = 1.0) -> bool:
     """Whether torque noise moves a channel, within the shortest segment, by more variance than a share of its own."""
     first = model.train[0]
     moved = within(model, noise, first, SHORTEST * float(np.median(first.grid.dt)))

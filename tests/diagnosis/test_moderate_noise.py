@@ -12,7 +12,7 @@ from pendulum import TRUTH, document, record
 from friction_ocp.diagnosis.base_fit import fit_base
 from friction_ocp.estimation.drive_noise import made_by_inputs
 from friction_ocp.estimation.model import prepare
-from friction_ocp.estimation.unknown_noise import noise_rules
+from friction_ocp.estimation.unknown_noise import noise_moves
 from friction_ocp.problem_file.load import load_problem
 from friction_ocp.recording.recording import Recording
 
@@ -27,7 +27,7 @@ def recorded(name: str, seed: int, noise: float = NOISE) -> Recording:
 def test_the_base_model_is_not_drawn_by_it(tmp_path: Path) -> None:
     """A heavier rotor answers less to noise: joined by that alone, segments found one 5 % too heavy."""
     model = prepare(load_problem(write_problem(tmp_path, recorded, document())))
-    assert not noise_rules(model, made_by_inputs(model))
+    assert not noise_moves(model, made_by_inputs(model))
     fitted = fit_base(model)
     assert fitted.footing.noisy_inputs == ("current",)
     assert fitted.values["arm.inertia"] == pytest.approx(TRUTH["arm.inertia"], rel=0.03)
