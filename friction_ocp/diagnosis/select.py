@@ -122,9 +122,15 @@ def choose(rivals: Sequence[Rival], blocks: Blocks, parts: int, level: float, rn
         aliases=tuple(aliases),
         same=tuple(rival for rival in ordered if rival is ordered[0] or is_same(rival, ordered[0])),
     )
-    others = [rival for rival in ordered[1:] if ordered[0].screened.includes(rival.screened)]
+    others = [rival for rival in ordered[1:] if _has_all_of(ordered[0], rival)]
     special = next((rival for rival in others if rival in aliases or _adds_nothing(ordered[0], rival)), None)
     return found if special is None else with_first(found, special)
+
+
+def _has_all_of(whole: Rival, part: Rival) -> bool:
+    """Whether a rival is another one and more; beside what else is in a model, that one may still be no plainer."""
+    plainer = part.standing.determined <= whole.standing.determined
+    return plainer and whole.screened.includes(part.screened)
 
 
 def _adds_nothing(whole: Rival, part: Rival) -> bool:

@@ -135,3 +135,5 @@ def test_a_wave_that_may_have_any_period_comes_after_an_unbalance() -> None:
     assert [item.key[0] for item in chosen(replace(wave, gains=wave.gains + 1.0), pull).named] == ["cogging"]
     elsewhere = rival("unbalance", "load", {"load.gravity.torque": 0.0}, gain=5.0)
     assert chosen(wave, elsewhere).rivals[0].key == wave.key
+    beside = replace(pull, standing=replace(pull.standing, determined=wave.standing.determined + 1))
+    assert chosen(wave, beside).rivals[0].key == wave.key
