@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 
+from friction_ocp.drive.coordinates import ORDERS
 from friction_ocp.drive.mechanism import Mechanism
 from friction_ocp.drive.parts import Channel
 from friction_ocp.estimation.experiment import Experiment
@@ -17,6 +19,7 @@ from friction_ocp.estimation.model import Model
 from friction_ocp.estimation.noise import NoiseFloor, noise_floor
 from friction_ocp.estimation.torque_noise import QUARTERS, acceleration_noise, driving, input_power, seen_variance
 from friction_ocp.recording import recording
+from friction_ocp.recording.feedback import unexplained_noise
 from friction_ocp.simulation.grid import FloatArray
 
 NUMERICAL_INPUT = 1e-3
@@ -103,8 +106,40 @@ def input_noise(model: Model, channel: Channel) -> tuple[float, float]:
 
 
 def input_floor(model: Model, channel: Channel) -> NoiseFloor:
-    """Return the noise floor of an input, as stated or as its samples show it."""
-    return noise_floor(channel, [(item.time, item.values) for item in _recorded(model, channel)])
+    """Return the noise floor of an input, as stated or as its samples show it.
+
+    What a loop makes of the measured motion is no noise, however fast it is.
+    """
+    floor = noise_floor(channel, [(item.time, item.values) for item in _recorded(model, channel)])
+    if floor.source != "high_frequency":
+        return floor
+    motions = tuple(item.name for item in model.problem.drive.outputs if item.signal in ORDERS)
+    recordings = [use.recording for use in model.problem.recordings]
+    levels = [_KNOWN.setdefault(item, _Levels(item)).of(channel.name, motions) for item in recordings]
+    known = [level for level in levels if np.isfinite(level)]
+    return replace(floor, std=min(floor.std, float(np.median(known)))) if known else floor
+
+
+class _Levels:
+    """By channel of a recording and motions beside it: the noise that these do not explain; see `unexplained_noise`."""
+
+    def __init__(self, recorded: recording.Recording) -> None:
+        self._channels = recorded.channels
+        self._known: dict[tuple[str, tuple[str, ...]], float] = {}
+
+    def of(self, name: str, motions: tuple[str, ...]) -> float:
+        """Return the level of a channel; motions on other clocks say nothing."""
+        if (name, motions) not in self._known:
+            own, channels = self._channels[name], self._channels
+            beside = [
+                channels[item].values for item in motions if item in channels and channels[item].clock == own.clock
+            ]
+            self._known[name, motions] = unexplained_noise(own.time, own.values, beside)
+        return self._known[name, motions]
+
+
+_KNOWN: WeakKeyDictionary[recording.Recording, _Levels] = WeakKeyDictionary()
+"""What was found of recordings that are still in use: many a fit asks again."""
 
 
 def _recorded(model: Model, channel: Channel) -> list[recording.Channel]:

@@ -34,7 +34,7 @@ def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
     t, y = _present(time, values)
     if len(t) < 9:
         return float("nan")
-    residual = _fourth_differences(t, y)
+    residual = fourth_differences(t, y)
     windows = np.lib.stride_tricks.sliding_window_view(y, 5)
     moving = residual[np.ptp(windows, axis=1) > 0.0]
     if not len(moving):
@@ -173,8 +173,8 @@ def _present(time: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, Fl
     return t[present], y[present]
 
 
-def _fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
-    """Return fourth divided differences over five neighbours, scaled so that white noise keeps its deviation."""
+def fourth_differences(t: FloatArray, y: FloatArray) -> FloatArray:
+    """Return (n - 4,) fourth divided differences over five neighbours, scaled: white noise keeps its deviation."""
     times = np.lib.stride_tricks.sliding_window_view(t / np.mean(np.diff(t)), 5)
     windows = np.lib.stride_tricks.sliding_window_view(y, 5)
     total, squares = np.zeros(len(times)), np.zeros(len(times))

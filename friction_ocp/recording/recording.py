@@ -27,9 +27,9 @@ class Channel:
     """Name of the time axis; channels that share it share their clock."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
-    """One run: its channels and where they came from."""
+    """One run: its channels and where they came from; equal to itself alone."""
 
     name: str
     channels: Mapping[str, Channel]
