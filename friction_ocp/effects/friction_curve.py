@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
+from friction_ocp.drive.topology import topology
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
@@ -79,15 +80,18 @@ def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
 
 
 class FrictionEffect(AbstractEffect):
-    """The model knows of no friction at all."""
+    """The model knows of no friction of a shaft, nor of those rigidly joined to it."""
 
     name: ClassVar[str] = "friction"
-    sentence: ClassVar[str] = "the drive has dry and viscous friction"
+    sentence: ClassVar[str] = "there is dry and viscous friction where the model has none"
 
     def places(self, drive: Drive) -> Iterable[str]:
-        """Return the shafts of a drive without any friction: beside that of one, others may be known to have none."""
-        if all(isinstance(shaft.friction.law, NoFriction) for shaft in drive.shafts):
-            yield from (shaft.name for shaft in moving_shafts(drive))
+        """Return the shafts that turn without any friction: what another rubs that turns alike is in that one's."""
+        joints = topology(drive)
+        for shaft in moving_shafts(drive):
+            alike = joints.members(joints.group_of[shaft.name])
+            if all(isinstance(drive.shaft(name).friction.law, NoFriction) for name in alike):
+                yield shaft.name
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
         dry, viscous = f"{place}.friction.tau_c", f"{place}.friction.viscous"

@@ -17,7 +17,7 @@ EACH = 10
 """Samples for each number of a regression, at least."""
 MOST = 20_000
 """Samples that it is fitted to, at most."""
-INLIERS, TIMES = 4.0, 3
+INLIERS, TIMES = 4.0, 12
 """Deviations within which residuals count, and how often these are chosen again: a loop that saturates is no filter."""
 MAD_TO_STD = 1.4826
 
