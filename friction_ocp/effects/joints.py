@@ -166,7 +166,11 @@ class ComplianceEffect(AbstractEffect):
         )
         tried = [*zip(springs, damping, strict=True), *((inertia * w**2, SHARP * inertia * w) for w in heard)]
         trials = tuple(Trial(({path: spring},), {f"{place}.damping": loss}, inverse=True) for spring, loss in tried)
-        return _rubbing_apart(drive, item, clues, Augmentation(added, {path: np.inf}, trials))
+        found = _rubbing_apart(drive, item, clues, Augmentation(added, {path: np.inf}, trials))
+        likely = [*range(len(rates), len(trials)), *sorted(range(len(rates)), key=lambda k: abs(k - len(rates) // 2))]
+        apart = found.trials[-len(trials) :]
+        large = tuple({**apart[k].fixed, **apart[k].amplitudes[0]} for k in likely)
+        return replace(found, outright=large)
 
 
 def _twist(item: Transmission, clues: Clues) -> tuple[float, float]:
