@@ -19,14 +19,14 @@ TRUTH = {
 }
 
 
-def record(name: str, noise: float, seconds: float, seed: int) -> Recording:
-    """Swing the pendulum; `noise` is that of the current, A."""
+def record(name: str, noise: float, seconds: float, seed: int, feedback: str = "fine") -> Recording:
+    """Swing the pendulum; `noise` is that of the current, A. The loop sees finer than is recorded, or the "angle"."""
     inertia, coulomb, viscous, weight = TRUTH.values()
     friction = PlantFriction("coulomb_viscous", tau_c=coulomb, viscous=viscous)
     plant = Plant(
         shafts=(PlantShaft("arm", inertia, friction, gravity=(weight, 0.0)),),
         motors=(PlantMotor("motor", "arm", torque_constant=TORQUE_CONSTANT, controller="loop"),),
-        controllers=(PlantController("loop", "cascade", "fine", kp=20.0, ki=4.0, kd=0.6, sample_time=STEP),),
+        controllers=(PlantController("loop", "cascade", feedback, kp=20.0, ki=4.0, kd=0.6, sample_time=STEP),),
         sensors=(
             PlantSensor("fine", "arm.theta", period=STEP, resolution=RESOLUTION / 16),
             PlantSensor("angle", "arm.theta", period=STEP, resolution=RESOLUTION),

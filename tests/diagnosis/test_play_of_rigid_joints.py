@@ -113,6 +113,37 @@ def test_friction_may_be_on_both_sides_of_what_gives(effect: str) -> None:
     assert all(each == pytest.approx(half | behind) for each in split[count:])
 
 
+def test_compliance_is_tried_outright() -> None:
+    """At every spring that is tried for its promise, with friction on both sides; a stiff one is a bowl of its own."""
+    found = effects()["compliance"].augment(rigid(NoFriction()), "motor-load", seen())
+    springs = sorted(trial.amplitudes[0]["motor-load.stiffness"] for trial in found.trials)
+    outright = [begin["motor-load.stiffness"] for begin in found.outright]
+    assert sorted(outright * 2) == springs and len({*springs}) > 2
+    assert all(
+        {"motor-load.damping", "motor.friction.tau_c", "load.friction.tau_c"} <= {*one} for one in found.outright
+    )
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "motor", "load", "places"),
+    [
+        (None, NoFriction(), NoFriction(), ["motor", "load"]),
+        (None, CoulombViscous(0.2, 0.01), NoFriction(), []),
+        (40.0, CoulombViscous(0.2, 0.01), NoFriction(), ["load"]),
+        (40.0, NoFriction(), CoulombViscous(0.2, 0.01), ["motor"]),
+        (40.0, NoFriction(), NoFriction(), ["motor", "load"]),
+    ],
+)
+def test_friction_may_be_missing_where_nothing_that_turns_alike_has_any(
+    stiffness: float | None, motor: AbstractFrictionLaw, load: AbstractFrictionLaw, places: list[str]
+) -> None:
+    """A spring parts what rubs, a rigid gear does not."""
+    drive = rigid(load)
+    shafts = (replace(drive.shafts[0], friction=FrictionElement(motor)), drive.shafts[1])
+    drive = replace(drive, shafts=shafts, transmissions=(Transmission("motor", "load", RATIO, stiffness),))
+    assert list(effects()["friction"].places(drive)) == places
+
+
 @pytest.mark.parametrize("effect", ["compliance", "backlash"])
 def test_friction_that_is_there_already_stays_as_it_is(effect: str) -> None:
     """A model with friction on both sides says where it is."""
