@@ -74,8 +74,8 @@ def contradictions(fitted: FittedModel, left: Excess, level: float) -> list[Cont
 def _may_attenuate(fitted: FittedModel, left: Excess) -> bool:
     """Whether the noise of measured inputs, which nobody states, is less than it is taken for.
 
-    A loop that follows the counts of an encoder throws its command to and fro, and that is no noise. With gaps laid for
-    so much of it, errors of the measured motion attenuate what resists it (Fuller 1987): a rotor looks too light.
+    What a loop makes of counts of an encoder that are not recorded looks like noise, and is none. With gaps laid for so
+    much of it, errors of the measured motion attenuate what resists it (Fuller 1987): a rotor looks too light.
     """
     model = fitted.model
     inputs = [channel for _, channel, _ in driving(model.problem.drive, {})]
