@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
 from friction_ocp.drive.topology import topology
+from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import (
     AbstractEffect,
     Augmentation,
@@ -38,6 +39,11 @@ from friction_ocp.parameters import Directional, Free, Tie, Value, is_off
 
 SHARE = 0.05
 """Size of a trial over the torque that moves the shaft: small, yet far above rounding."""
+
+
+PARTS = {"tau_c": 1, "viscous": 2}
+"""Parameters of friction that two shafts may share, and the power of the speed ratio by which they are larger behind a
+reducer."""
 
 
 EXPONENT = 2.0
@@ -72,6 +78,21 @@ def is_dry(shaft: Shaft) -> bool:
     return not isinstance(plain_law(shaft.friction.law), (NoFriction, Viscous))
 
 
+def halved(drive: Drive, dry: Collection[str], name: str, clues: Clues) -> dict[str, float]:
+    """Return friction by path where a shaft without any takes half of what is fitted at `dry` ones, at the same power.
+
+    Where a spring parts them, or is to, it matters on which side something rubs, and a model may have all on one.
+    """
+    found = {f"{name}.friction.{part}": 0.0 for part in PARTS}
+    for leaf in drive_leaves(drive):
+        shaft, _, part = leaf.path.partition(".friction.")
+        if shaft in dry and part in PARTS and isinstance(leaf.value, Free):
+            found[leaf.path] = 0.5 * clues.numbers[leaf.path]
+            faster = clues.typical_speed(shaft) / clues.typical_speed(name)
+            found[f"{name}.friction.{part}"] += found[leaf.path] * faster ** PARTS[part]
+    return found
+
+
 def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
     """Return the free Stribeck speed of friction that falls with the speed, and where it is tried, in rising order."""
     speed = clues.typical_speed(place)
@@ -99,7 +120,9 @@ class FrictionEffect(AbstractEffect):
         slope = size / max(clues.speed_quantiles(place, (0.9,))[0], 1e-12)
         law = CoulombViscous(upwards(size), upwards(slope))
         added = change_shaft(drive, place, friction=replace(drive.shaft(place).friction, law=law))
-        return Augmentation(added, {dry: 0.0, viscous: 0.0}, (Trial(({dry: size}, {viscous: slope})),))
+        begin = halved(drive, [shaft.name for shaft in drive.shafts if is_dry(shaft)], place, clues)
+        large = (begin,) if any(begin.values()) else ()
+        return Augmentation(added, {dry: 0.0, viscous: 0.0}, (Trial(({dry: size}, {viscous: slope})),), outright=large)
 
 
 class StribeckEffect(AbstractEffect):

@@ -10,7 +10,6 @@ import numpy as np
 
 from friction_ocp.drive.parts import ROUNDING, Drive, Hysteresis, KinematicError, LoopSprings, SecondStage, Transmission
 from friction_ocp.drive.topology import topology
-from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import (
     SHARP,
     AbstractEffect,
@@ -23,16 +22,15 @@ from friction_ocp.effects.effect import (
     transmission,
     upwards,
 )
-from friction_ocp.effects.friction_curve import is_dry
+from friction_ocp.effects.friction_curve import PARTS, halved, is_dry
 from friction_ocp.effects.periodic import AbstractWaveEffect
 from friction_ocp.effects.periods import Likely
 from friction_ocp.friction.static import CoulombViscous, NoFriction
 from friction_ocp.friction.wave import Wave
 from friction_ocp.parameters import Free, is_off
 
-RUBS, PARTS = 0.05, {"tau_c": 1, "viscous": 2}
-"""Friction on the other side of a joint over the typical torque there, for its bounds; its parameters, and the power of
-the speed ratio by which they are larger behind a reducer."""
+RUBS = 0.05
+"""Friction on the other side of a joint over the typical torque there, for its bounds."""
 HARD = 0.1
 """Frequency at which a drive swings on flanks of a joint that the model says is rigid, over that of the samples."""
 RUNG, LARGEST_PLAY = 5.0, 0.03
@@ -118,13 +116,7 @@ def _rubbing_apart(drive: Drive, item: Transmission, clues: Clues, apart: Augmen
         law = CoulombViscous(upwards(RUBS * torque), upwards(RUBS * torque / speed))
         added = change_shaft(apart.drive, name, friction=replace(drive.shaft(name).friction, law=law))
         off = {f"{name}.friction.{part}": 0.0 for part in PARTS}
-        half = dict(off)
-        for leaf in drive_leaves(drive):
-            shaft, _, part = leaf.path.partition(".friction.")
-            if shaft in dry and part in PARTS and isinstance(leaf.value, Free):
-                half[leaf.path] = 0.5 * clues.numbers[leaf.path]
-                faster = clues.typical_speed(shaft) / speed
-                half[f"{name}.friction.{part}"] += half[leaf.path] * faster ** PARTS[part]
+        half = halved(drive, dry, name, clues)
         split = [replace(trial, fixed={**trial.fixed, **half}) for trial in apart.trials]
         apart = replace(apart, drive=added, off={**apart.off, **off}, trials=(*apart.trials, *split))
     return apart

@@ -78,6 +78,21 @@ def test_a_spring_with_friction_behind_it_is_one_effect(tmp_path: Path) -> None:
     assert result["verdict"] == "explained"
 
 
+@pytest.mark.slow
+def test_friction_that_is_missing_behind_a_spring_is_found(tmp_path: Path) -> None:
+    """A model with all of it on the motor's side is named for what it lacks, and no loop of the joint stands in."""
+    path = without_play(tmp_path, geared(40.0, 0.0), rubs=False)
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    spring = {"stiffness": {"guess": 35.0, "min": 1.0}, "damping": {"guess": 1.0, "min": 0.0}}
+    document["drive"]["transmissions"] = [{"ratio": RATIO, **spring}]
+    document["diagnosis"]["effects"] = ["friction", "transmission_hysteresis", "presliding", "backlash"]
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    result = diagnosed(path)
+    (accepted,) = result["accepted"]
+    assert (accepted["effect"], accepted["component"]) == ("friction", "load")
+    assert accepted["parameters"]["load.friction.tau_c"]["value"] == pytest.approx(0.1, rel=0.1)
+
+
 SPEED, TIME = 20.0, 1e-3 * np.arange(100)
 
 
@@ -142,6 +157,20 @@ def test_friction_may_be_missing_where_nothing_that_turns_alike_has_any(
     shafts = (replace(drive.shafts[0], friction=FrictionElement(motor)), drive.shafts[1])
     drive = replace(drive, shafts=shafts, transmissions=(Transmission("motor", "load", RATIO, stiffness),))
     assert list(effects()["friction"].places(drive)) == places
+
+
+def test_friction_is_tried_outright_as_half_of_what_is_fitted_elsewhere() -> None:
+    """What is known there stays there."""
+    fitted = rigid(NoFriction())
+    drive = replace(fitted, transmissions=(Transmission("motor", "load", RATIO, 40.0),))
+    motor = {"motor.friction.tau_c": 0.1, "motor.friction.viscous": 0.005}
+    (begin,) = effects()["friction"].augment(drive, "load", seen(40.0)).outright
+    assert begin == pytest.approx(
+        motor | {"load.friction.tau_c": 0.1 * RATIO, "load.friction.viscous": 0.005 * RATIO**2}
+    )
+    known = replace(drive.shafts[0], friction=FrictionElement(CoulombViscous(0.2, 0.01)))
+    drive = replace(drive, shafts=(known, drive.shafts[1]))
+    assert not effects()["friction"].augment(drive, "load", seen(40.0)).outright
 
 
 @pytest.mark.parametrize("effect", ["compliance", "backlash"])
