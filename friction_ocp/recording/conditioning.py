@@ -17,7 +17,7 @@ interpolate: Any = _interpolate  # its own types are incomplete
 linalg: Any = _linalg
 optimize: Any = _optimize
 
-_MAD_TO_STD = 1.4826
+MAD_TO_STD = 1.4826
 _MIN_LEVELS = 5
 FEWEST_SAMPLES = 5
 """Samples from which the motion between them can be told."""
@@ -40,8 +40,8 @@ def high_frequency_noise(time: npt.ArrayLike, values: npt.ArrayLike) -> float:
     if not len(moving):
         return 0.0
     if len(np.unique(y)) < _MIN_LEVELS:
-        return _MAD_TO_STD * float(np.median(np.abs(residual)))
-    robust = _MAD_TO_STD * float(np.median(np.abs(moving)))
+        return MAD_TO_STD * float(np.median(np.abs(residual)))
+    robust = MAD_TO_STD * float(np.median(np.abs(moving)))
     resolution = detect_resolution(y)
     if resolution is None or not 0.05 * resolution < robust <= resolution:
         return robust

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from friction_ocp.recording.conditioning import fourth_differences
+from friction_ocp.recording.conditioning import MAD_TO_STD, fourth_differences
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -19,7 +19,6 @@ MOST = 20_000
 """Samples that it is fitted to, at most."""
 INLIERS, TIMES = 4.0, 12
 """Deviations within which residuals count, and how often these are chosen again: a loop that saturates is no filter."""
-MAD_TO_STD = 1.4826
 
 
 def unexplained_noise(time: FloatArray, values: FloatArray, motions: Sequence[FloatArray]) -> float:
