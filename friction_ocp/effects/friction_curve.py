@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from friction_ocp.drive.parts import Drive, Shaft
-from friction_ocp.drive.topology import topology
 from friction_ocp.drive.values import drive_leaves
 from friction_ocp.effects.effect import (
     AbstractEffect,
@@ -100,6 +99,16 @@ def stribeck_speed(clues: Clues, place: str) -> tuple[Free, list[float]]:
     return Free(tried[len(tried) // 2], 1e-2 * tried[0], 3.0 * speed), tried
 
 
+def _turning_alike(drive: Drive, name: str) -> set[str]:
+    """Return a shaft and those that rigid joints join to it; of any drive, be it that no model can be made of it."""
+    alike = {name}
+    for _ in drive.transmissions:
+        for item in drive.transmissions:
+            ends = {item.from_shaft, item.to_shaft}
+            alike |= ends if item.rigid and ends & alike else set()
+    return alike
+
+
 class FrictionEffect(AbstractEffect):
     """The model knows of no friction of a shaft, nor of those rigidly joined to it."""
 
@@ -108,10 +117,9 @@ class FrictionEffect(AbstractEffect):
 
     def places(self, drive: Drive) -> Iterable[str]:
         """Return the shafts that turn without any friction: what another rubs that turns alike is in that one's."""
-        joints = topology(drive)
+        rubbed = {shaft.name for shaft in drive.shafts if not isinstance(shaft.friction.law, NoFriction)}
         for shaft in moving_shafts(drive):
-            alike = joints.members(joints.group_of[shaft.name])
-            if all(isinstance(drive.shaft(name).friction.law, NoFriction) for name in alike):
+            if not rubbed & _turning_alike(drive, shaft.name):
                 yield shaft.name
 
     def augment(self, drive: Drive, place: str, clues: Clues) -> Augmentation:
